@@ -1,0 +1,18 @@
+//! Algorithms on deforming mesh sequences, verified and timed beside independent oracles.
+//!
+//! The map of the crate; imports point downwards in this list only.
+//!
+//! | module | what is there |
+//! |---|---|
+//! | [`mesh`] | connectivity, measures (area, volume, bounds), distance to a surface |
+//! | [`linalg`] | what is thin over faer and nalgebra |
+//! | [`sequence`] | deforming sequences, their file formats and the embedded `@name` sequences |
+//! | [`signal`] | Cashman & Hormann 2012: time, pose and shape signals |
+//! | [`stages`] | the algorithms as named stages over typed arrays |
+//! | [`harness`] | cases, engines, checks, verdicts, timing, records |
+//! | [`report`] | plots and the HTML report |
+//! | [`cmd`] | the command line, one file a verb |
+
+pub mod linalg;
+pub mod mesh;
+pub mod sequence;

@@ -1,0 +1,1 @@
+//! What is thin over faer and nalgebra.
