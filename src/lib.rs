@@ -16,3 +16,4 @@
 pub mod linalg;
 pub mod mesh;
 pub mod sequence;
+pub mod signal;

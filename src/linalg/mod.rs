@@ -1,1 +1,8 @@
-//! What is thin over faer and nalgebra.
+//! What is thin over faer and nalgebra. Every routine here runs on one thread in a fixed order of operations, so that the same input
+//! gives the same bits; callers run independent pieces in parallel.
+
+pub mod appended_qr;
+pub mod banded;
+pub mod dense;
+pub mod kernels;
+pub mod pca;

@@ -1,0 +1,203 @@
+//! Dense factorisations of faer, on one thread, with errors in place of panics.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::{evd, householder, qr, svd, triangular_solve};
+use faer::{Conj, Mat, MatRef, Par, diag::Diag};
+use thiserror::Error;
+
+/// Why a dense factorisation failed.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum FactorError {
+    /// The iteration for eigenvalues or singular values did not settle, which non-finite or extreme entries can cause.
+    #[error("the {factorisation} of a {rows} x {columns} matrix did not converge; look for extreme values in the input")]
+    NoConvergence {
+        factorisation: &'static str,
+        rows: usize,
+        columns: usize,
+    },
+}
+
+/// Eigenvalues by decreasing size and their unit eigenvectors as columns.
+pub struct SymmetricEigen {
+    pub values: Vec<f64>,
+    pub vectors: Mat<f64>,
+}
+
+/// The eigendecomposition of a symmetric matrix, of which the lower triangle is read. O(n^3).
+pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Result<SymmetricEigen, FactorError> {
+    let n = a.nrows();
+    let mut values = Diag::<f64>::zeros(n);
+    let mut vectors = Mat::zeros(n, n);
+    let scratch = evd::self_adjoint_evd_scratch::<f64>(
+        n,
+        evd::ComputeEigenvectors::Yes,
+        Par::Seq,
+        Default::default(),
+    );
+    evd::self_adjoint_evd(
+        a,
+        values.as_mut(),
+        Some(vectors.as_mut()),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| FactorError::NoConvergence {
+        factorisation: "eigendecomposition",
+        rows: n,
+        columns: n,
+    })?;
+    Ok(SymmetricEigen {
+        values: values.column_vector().iter().rev().copied().collect(),
+        vectors: Mat::from_fn(n, n, |i, j| vectors[(i, n - 1 - j)]),
+    })
+}
+
+/// A = U diag(s) V^T with min(rows, columns) columns in U and V and decreasing s.
+pub struct ThinSvd {
+    pub u: Mat<f64>,
+    pub s: Vec<f64>,
+    pub v: Mat<f64>,
+}
+
+/// The thin singular value decomposition. O(rows columns min(rows, columns)).
+pub fn thin_svd(a: MatRef<'_, f64>) -> Result<ThinSvd, FactorError> {
+    let (rows, columns) = a.shape();
+    let size = rows.min(columns);
+    let (mut u, mut v) = (Mat::zeros(rows, size), Mat::zeros(columns, size));
+    let mut s = Diag::<f64>::zeros(size);
+    let thin = svd::ComputeSvdVectors::Thin;
+    let scratch = svd::svd_scratch::<f64>(rows, columns, thin, thin, Par::Seq, Default::default());
+    svd::svd(
+        a,
+        s.as_mut(),
+        Some(u.as_mut()),
+        Some(v.as_mut()),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| FactorError::NoConvergence {
+        factorisation: "singular value decomposition",
+        rows,
+        columns,
+    })?;
+    Ok(ThinSvd {
+        u,
+        s: s.column_vector().iter().copied().collect(),
+        v,
+    })
+}
+
+/// A Householder QR factorisation, Q in its implicit form.
+pub struct Qr {
+    factors: Mat<f64>,
+    coefficients: Mat<f64>,
+}
+
+impl Qr {
+    /// Factors A (rows x columns), overwriting it. O(rows columns min(rows, columns)).
+    pub fn new(mut a: Mat<f64>) -> Self {
+        let (rows, columns) = a.shape();
+        let block = qr::no_pivoting::factor::recommended_block_size::<f64>(rows, columns);
+        let mut coefficients = Mat::zeros(block, rows.min(columns));
+        let scratch = qr::no_pivoting::factor::qr_in_place_scratch::<f64>(
+            rows,
+            columns,
+            block,
+            Par::Seq,
+            Default::default(),
+        );
+        qr::no_pivoting::factor::qr_in_place(
+            a.as_mut(),
+            coefficients.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            Default::default(),
+        );
+        Self {
+            factors: a,
+            coefficients,
+        }
+    }
+
+    /// Entry (i, j) of R, i <= j.
+    pub fn r(&self, i: usize, j: usize) -> f64 {
+        self.factors[(i, j)]
+    }
+
+    /// Replaces B by Q^T B, with the full square Q.
+    pub fn apply_transpose(&self, b: &mut Mat<f64>) {
+        let scratch = self.scratch(b.ncols());
+        householder::apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj(
+            self.factors.as_ref(),
+            self.coefficients.as_ref(),
+            Conj::No,
+            b.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+        );
+    }
+
+    /// Replaces B by Q B, with the full square Q.
+    pub fn apply(&self, b: &mut Mat<f64>) {
+        let scratch = self.scratch(b.ncols());
+        householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
+            self.factors.as_ref(),
+            self.coefficients.as_ref(),
+            Conj::No,
+            b.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+        );
+    }
+
+    fn scratch(&self, columns: usize) -> faer::dyn_stack::StackReq {
+        householder::apply_block_householder_sequence_transpose_on_the_left_in_place_scratch::<f64>(
+            self.factors.nrows(),
+            self.coefficients.nrows(),
+            columns,
+        )
+    }
+
+    /// Solves R X = B's leading rows, for a factorisation of full column rank with rows >= columns.
+    pub fn solve_upper(&self, b: &Mat<f64>) -> Mat<f64> {
+        let columns = self.factors.ncols();
+        let mut x = b.get(..columns, ..).to_owned();
+        triangular_solve::solve_upper_triangular_in_place(
+            self.factors.get(..columns, ..),
+            x.as_mut(),
+            Par::Seq,
+        );
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(rows: usize, columns: usize) -> Mat<f64> {
+        Mat::from_fn(rows, columns, |i, j| ((i + 2) as f64 * (j as f64 + 0.7)).sin())
+    }
+
+    #[test]
+    fn qr_solves_a_consistent_system() {
+        let a = sample(9, 4);
+        let x = sample(4, 2);
+        let mut b = &a * &x;
+        let qr = Qr::new(a);
+        qr.apply_transpose(&mut b);
+        assert!((qr.solve_upper(&b) - x).norm_max() < 1e-12);
+    }
+
+    #[test]
+    fn svd_and_eigen_agree() {
+        let a = sample(12, 5);
+        let svd = thin_svd(a.as_ref()).unwrap();
+        let eigen = symmetric_eigen((a.transpose() * &a).as_ref()).unwrap();
+        for (s, lambda) in svd.s.iter().zip(&eigen.values) {
+            assert!((s * s - lambda).abs() < 1e-12 * eigen.values[0]);
+        }
+    }
+}

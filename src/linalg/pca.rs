@@ -1,0 +1,246 @@
+//! Principal components of many numbers in few samples: the route that costs one product of the data with itself.
+
+use faer::linalg::matmul::{matmul, triangular};
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+use super::dense::{FactorError, Qr, symmetric_eigen, thin_svd};
+
+/// Rows of the data handled at a time; n columns of this many numbers stay in cache.
+const BLOCK: usize = 256;
+/// Partial Gram matrices, added up in a fixed order: the result does not depend on the number of threads.
+const PARTS: usize = 8;
+/// Squared ratio of the last kept singular value to the first, below which the Householder route is taken: squaring the data costs the basis
+/// up to eps over this ratio of its orthonormality, 2e-10 at worst.
+const GRAM_LIMIT: f64 = 1e-6;
+
+/// The principal components of n samples of d numbers.
+pub struct Pca {
+    /// The mean sample, d numbers.
+    pub mean: Vec<f64>,
+    /// d x m: orthonormal directions by decreasing singular value; each one's entry of largest magnitude is positive.
+    pub basis: Mat<f64>,
+    /// m x n: the samples' coordinates, basis^T (z - mean).
+    pub coordinates: Mat<f64>,
+    /// All singular values of the centred data that were found, decreasing; at least m of them.
+    pub singular_values: Vec<f64>,
+}
+
+/// The first min(m, rank) principal components of `samples`, d x n with a sample a column.
+///
+/// The Gram matrix of the centred samples is formed block by block (n^2 d flops, no d x n temporary) and its eigenvectors give the basis. Where the
+/// kept singular values spread too far for that, the singular values come from a Householder QR of the data, which costs four times as much and
+/// a copy of the data, and has the accuracy of an SVD. Rank counts singular values above max(n, d) eps times the largest.
+pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
+    let (d, n) = samples.shape();
+    let m = m.min(n.saturating_sub(1)).min(d);
+    let mean = mean(samples);
+    if m == 0 {
+        return Ok(empty(mean, d, n));
+    }
+    if n < d
+        && let Some(pca) = by_gram(samples, &mean, m)?
+    {
+        return Ok(pca);
+    }
+    by_qr(samples, mean, m)
+}
+
+fn empty(mean: Vec<f64>, d: usize, n: usize) -> Pca {
+    Pca {
+        mean,
+        basis: Mat::zeros(d, 0),
+        coordinates: Mat::zeros(0, n),
+        singular_values: Vec::new(),
+    }
+}
+
+fn mean(samples: MatRef<'_, f64>) -> Vec<f64> {
+    let (d, n) = samples.shape();
+    let mut mean = vec![0.0; d];
+    mean.par_chunks_mut(BLOCK).enumerate().for_each(|(b, mean)| {
+        for j in 0..n {
+            let column = samples.get(b * BLOCK..b * BLOCK + mean.len(), j);
+            for (sum, x) in mean.iter_mut().zip(column.iter()) {
+                *sum += x;
+            }
+        }
+        mean.iter_mut().for_each(|x| *x /= n as f64);
+    });
+    mean
+}
+
+/// Writes rows `first..` of the centred samples into `block`, one sample a column.
+fn centred_rows(samples: MatRef<'_, f64>, mean: &[f64], first: usize, mut block: MatMut<'_, f64>) {
+    let rows = block.nrows();
+    let mean = &mean[first..first + rows];
+    for j in 0..samples.ncols() {
+        let source = samples.get(first..first + rows, j);
+        let target = block.rb_mut().col_mut(j);
+        for ((y, x), mean) in target.iter_mut().zip(source.iter()).zip(mean) {
+            *y = x - mean;
+        }
+    }
+}
+
+/// The lower triangle of Y^T Y for the centred samples Y.
+fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
+    let (d, n) = samples.shape();
+    let blocks: Vec<usize> = (0..d).step_by(BLOCK).collect();
+    let parts: Vec<Mat<f64>> = blocks
+        .par_chunks(blocks.len().div_ceil(PARTS))
+        .map(|firsts| {
+            let mut sum = Mat::zeros(n, n);
+            let mut buffer = Mat::zeros(BLOCK, n);
+            for &first in firsts {
+                let mut rows = buffer.get_mut(..BLOCK.min(d - first), ..);
+                centred_rows(samples, mean, first, rows.rb_mut());
+                let rows = rows.rb();
+                triangular::matmul(
+                    sum.as_mut(),
+                    triangular::BlockStructure::TriangularLower,
+                    Accum::Add,
+                    rows.transpose(),
+                    triangular::BlockStructure::Rectangular,
+                    rows,
+                    triangular::BlockStructure::Rectangular,
+                    1.0,
+                    Par::Seq,
+                );
+            }
+            sum
+        })
+        .collect();
+    parts
+        .into_iter()
+        .reduce(|sum, part| sum + part)
+        .unwrap_or_else(|| Mat::zeros(n, n))
+}
+
+/// The Gram route, or None where the kept singular values spread too far for it.
+fn by_gram(samples: MatRef<'_, f64>, mean: &[f64], m: usize) -> Result<Option<Pca>, FactorError> {
+    let n = samples.ncols();
+    let eigen = symmetric_eigen(gram(samples, mean).as_ref())?;
+    if eigen.values[m - 1] <= GRAM_LIMIT * eigen.values[0] {
+        return Ok(None);
+    }
+    let sigma: Vec<f64> = eigen.values.iter().map(|v| v.max(0.0).sqrt()).collect();
+    let weights = Mat::from_fn(n, m, |i, j| eigen.vectors[(i, j)] / sigma[j]);
+    let mut basis = centred_product(samples, mean, weights.as_ref());
+    let signs = orient(&mut basis);
+    let coordinates = Mat::from_fn(m, n, |j, i| signs[j] * sigma[j] * eigen.vectors[(i, j)]);
+    Ok(Some(Pca {
+        mean: mean.to_vec(),
+        basis,
+        coordinates,
+        singular_values: sigma,
+    }))
+}
+
+/// Y W for the centred samples Y (d x n) and W (n x m), a block of rows at a time.
+fn centred_product(samples: MatRef<'_, f64>, mean: &[f64], w: MatRef<'_, f64>) -> Mat<f64> {
+    let (d, n) = samples.shape();
+    let mut product = Mat::zeros(d, w.ncols());
+    product
+        .as_mut()
+        .par_row_chunks_mut(BLOCK)
+        .enumerate()
+        .for_each_init(
+            || Mat::zeros(BLOCK, n),
+            |buffer, (block, target)| {
+                let mut rows = buffer.get_mut(..target.nrows(), ..);
+                centred_rows(samples, mean, block * BLOCK, rows.rb_mut());
+                matmul(target, Accum::Replace, rows.rb(), w, 1.0, Par::Seq);
+            },
+        );
+    product
+}
+
+/// The Householder route: Y = Q R and R = U S V^T give Y = (Q U) S V^T.
+fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, FactorError> {
+    let (d, n) = samples.shape();
+    let mut centred = Mat::zeros(d, n);
+    centred_rows(samples, &mean, 0, centred.as_mut());
+    let (u, svd_v, s) = if d > n {
+        let qr = Qr::new(centred);
+        let r = Mat::from_fn(n, n, |i, j| if i <= j { qr.r(i, j) } else { 0.0 });
+        let svd = thin_svd(r.as_ref())?;
+        let mut u = Mat::zeros(d, n);
+        u.get_mut(..n, ..).copy_from(&svd.u);
+        qr.apply(&mut u);
+        (u, svd.v, svd.s)
+    } else {
+        let svd = thin_svd(centred.as_ref())?;
+        (svd.u, svd.v, svd.s)
+    };
+    let limit = n.max(d) as f64 * f64::EPSILON * s.first().copied().unwrap_or(0.0);
+    let m = m.min(s.iter().take_while(|&&s| s > limit).count());
+    let mut basis = u.get(.., ..m).to_owned();
+    let signs = orient(&mut basis);
+    Ok(Pca {
+        mean,
+        coordinates: Mat::from_fn(m, n, |j, i| signs[j] * s[j] * svd_v[(i, j)]),
+        basis,
+        singular_values: s,
+    })
+}
+
+/// Turns each column so that its entry of largest magnitude (the first of equals) is positive; returns the signs applied.
+fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
+    (0..basis.ncols())
+        .map(|j| {
+            let column = basis.col_as_slice_mut(j);
+            let largest = column
+                .iter()
+                .fold(0.0f64, |best, &x| if x.abs() > best.abs() { x } else { best });
+            if largest < 0.0 {
+                column.iter_mut().for_each(|x| *x = -*x);
+                -1.0
+            } else {
+                1.0
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn residual(samples: &Mat<f64>, pca: &Pca) -> f64 {
+        let rebuilt = &pca.basis * &pca.coordinates;
+        let mean = Mat::from_fn(samples.nrows(), samples.ncols(), |i, _| pca.mean[i]);
+        (samples - mean - rebuilt).norm_l2()
+    }
+
+    #[test]
+    fn both_routes_agree_and_the_full_rank_rebuilds() {
+        let samples = Mat::from_fn(700, 9, |i, j| ((i + 1) as f64 * (j as f64 + 0.3)).sin());
+        let whole = pca(samples.as_ref(), 8).unwrap();
+        assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
+        let mean = mean(samples.as_ref());
+        let gram = by_gram(samples.as_ref(), &mean, 4).unwrap().unwrap();
+        let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
+        assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);
+        assert!((&gram.coordinates - &qr.coordinates).norm_max() < 1e-12 * samples.norm_l2());
+    }
+
+    #[test]
+    fn widely_spread_singular_values_keep_their_accuracy() {
+        let samples = Mat::from_fn(300, 6, |i, j| {
+            10f64.powi(-3 * j as i32) * ((i * (j + 2)) as f64 * 0.1).cos()
+        });
+        let whole = pca(samples.as_ref(), 5).unwrap();
+        assert!(residual(&samples, &whole) < 1e-14 * samples.norm_l2());
+        let gram = whole.basis.transpose() * &whole.basis;
+        assert!((gram - Mat::<f64>::identity(5, 5)).norm_max() < 1e-13);
+    }
+
+    #[test]
+    fn repeated_samples_cut_the_rank() {
+        let samples = Mat::from_fn(50, 6, |i, j| ((i * (j % 3 + 1)) as f64).sin());
+        assert_eq!(pca(samples.as_ref(), 5).unwrap().basis.ncols(), 2);
+        assert_eq!(pca(samples.as_ref(), 0).unwrap().basis.ncols(), 0);
+    }
+}

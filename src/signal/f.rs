@@ -1,0 +1,414 @@
+//! The cubic spline under the time signal: f~ from parameters to the pose plane (sections 2.3 and 3.3).
+
+use faer::Mat;
+use thiserror::Error;
+
+use super::Point;
+use super::parameters::distinct;
+use crate::linalg::banded::{BAND, BandedLeastSquares};
+use crate::linalg::dense::{FactorError, thin_svd};
+
+/// Pivots, or singular values, below this share of the largest count as 0: the data leave freedom there.
+const DEFICIENT: f64 = 1e-11;
+
+/// f~(u) = sum_j B_j(u) f_j with cubic B-splines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spline {
+    /// f_1 .. f_k.
+    pub control: Vec<Point>,
+    /// u_0 .. u_{k+1}; the domain is [u_2, u_{k-1}] (reading 1).
+    pub knots: Vec<f64>,
+}
+
+/// Why there is no spline.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum SplineError {
+    /// Too few knots or knots that decrease.
+    #[error("expected at least 6 non-decreasing finite knots with u_2 < u_(k-1), found {found} knots of which number {at} (0-based) breaks this")]
+    BadKnots { found: usize, at: usize },
+    /// Another number of parameters than of points.
+    #[error("expected a parameter for each of {points} points, found {parameters}")]
+    LengthMismatch { parameters: usize, points: usize },
+    /// A parameter outside the domain.
+    #[error("parameter {index} (0-based) is {value}, outside the domain [{low}, {high}] of the knots")]
+    OutsideDomain {
+        index: usize,
+        value: f64,
+        low: f64,
+        high: f64,
+    },
+    /// A dense factorisation failed.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}
+
+/// The knots with one more copy of each end, and what a cubic basis needs of them.
+struct Basis {
+    knots: Vec<f64>,
+}
+
+/// Four neighbouring basis functions (or derivatives) and the index of the first.
+type Local = (usize, [f64; BAND]);
+
+impl Basis {
+    fn new(knots: &[f64]) -> Result<Self, SplineError> {
+        let found = knots.len();
+        let bad = |at| SplineError::BadKnots { found, at };
+        if found < 6 {
+            return Err(bad(found));
+        }
+        if let Some(at) = (1..found).find(|&i| knots[i].is_nan() || knots[i] < knots[i - 1]) {
+            return Err(bad(at));
+        }
+        if knots[2] >= knots[found - 3] || !knots[0].is_finite() || !knots[found - 1].is_finite() {
+            return Err(bad(2));
+        }
+        let ends = [knots[0], knots[found - 1]];
+        let mut all = vec![ends[0]];
+        all.extend_from_slice(knots);
+        all.push(ends[1]);
+        Ok(Self { knots: all })
+    }
+
+    fn count(&self) -> usize {
+        self.knots.len() - 4
+    }
+
+    fn domain(&self) -> (f64, f64) {
+        (self.knots[3], self.knots[self.count()])
+    }
+
+    /// The non-empty span that holds u, as the index of its left knot; u is clamped to the domain.
+    fn span(&self, u: f64) -> usize {
+        let k = self.count();
+        let (low, high) = self.domain();
+        if u >= high {
+            return self.knots[3..k].partition_point(|&x| x < high) + 2;
+        }
+        self.knots[3..=k].partition_point(|&x| x <= u.max(low)) + 2
+    }
+
+    /// Values at u of the four functions that do not vanish on its span (Cox & de Boor).
+    fn values(&self, u: f64) -> Local {
+        let (low, high) = self.domain();
+        let u = u.clamp(low, high);
+        let s = self.span(u);
+        let mut b = [1.0, 0.0, 0.0, 0.0];
+        for degree in 1..BAND {
+            let mut saved = 0.0;
+            for r in 0..degree {
+                let (right, left) = (self.knots[s + r + 1], self.knots[s + 1 + r - degree]);
+                let share = b[r] / (right - left);
+                b[r] = saved + (right - u) * share;
+                saved = (u - left) * share;
+            }
+            b[degree] = saved;
+        }
+        (s - 3, b)
+    }
+
+    /// Second derivatives, at u, of the four functions of the span s: linear B-splines of second differences of the coefficients.
+    fn second_derivatives(&self, s: usize, u: f64) -> Local {
+        let t = &self.knots;
+        let hat = [(t[s + 1] - u), (u - t[s])].map(|x| x / (t[s + 1] - t[s]));
+        let mut row = [0.0; BAND];
+        for (q, weight) in hat.iter().enumerate() {
+            // Coefficient q of the second derivative on this span takes coefficients s-3+q .. s-1+q.
+            let i = s - 1 + q;
+            let wide = [6.0 / (t[i + 2] - t[i]), 1.0 / (t[i + 2] - t[i - 1]), 1.0 / (t[i + 3] - t[i])];
+            row[q] += weight * wide[0] * wide[1];
+            row[q + 1] -= weight * wide[0] * (wide[1] + wide[2]);
+            row[q + 2] += weight * wide[0] * wide[2];
+        }
+        (s - 3, row)
+    }
+
+    /// Rows whose squares sum to the integral of |f''|^2 over the domain: f'' is linear on each span.
+    fn energy_rows(&self) -> Vec<Local> {
+        let t = &self.knots;
+        let spans = (3..self.count()).filter(|&s| t[s] < t[s + 1]);
+        spans
+            .flat_map(|s| {
+                let h = t[s + 1] - t[s];
+                let (first, a) = self.second_derivatives(s, t[s]);
+                let (_, b) = self.second_derivatives(s, t[s + 1]);
+                let combine = |f: f64, sign: f64| std::array::from_fn(|j| f * (a[j] + sign * b[j]));
+                [
+                    (first, combine(h.sqrt() / 2.0, 1.0)),
+                    (first, combine((h / 12.0).sqrt(), -1.0)),
+                ]
+            })
+            .collect()
+    }
+}
+
+fn apply(row: &Local, c: &[Point]) -> Point {
+    let (first, values) = row;
+    std::array::from_fn(|a| (0..BAND).map(|j| values[j] * c[first + j][a]).sum())
+}
+
+impl Spline {
+    /// Minimises (7) over all k control points for these knots (k + 2 of them); ends are not interpolated (reading 3).
+    ///
+    /// `parameters` are the n non-decreasing t_i. Where the data leave freedom because k exceeds the number of distinct parameters, the solution
+    /// is the smoothest one, least in the integral of |f''|^2; at k = n + 2 with the parameters as knots it is the natural spline. Where k does not
+    /// exceed it and the matrix is deficient all the same, the solution of least norm. O(n + k) for all but that last case, which takes an SVD.
+    pub fn fit(parameters: &[f64], points: &[Point], knots: &[f64]) -> Result<Self, SplineError> {
+        let basis = Basis::new(knots)?;
+        check_parameters(parameters, points, &basis)?;
+        let rows: Vec<Local> = parameters.iter().map(|&t| basis.values(t)).collect();
+        let freedom = basis.count().saturating_sub(distinct(parameters).len());
+        let control = match banded(&basis, &rows, points, freedom) {
+            Some(control) => control,
+            None => dense(&basis, &rows, points, freedom)?,
+        };
+        Ok(Self {
+            control,
+            knots: knots.to_vec(),
+        })
+    }
+
+    /// f~(u); beyond the domain the end points hold. O(log k).
+    pub fn evaluate(&self, u: f64) -> Point {
+        match Basis::new(&self.knots) {
+            Ok(basis) => apply(&basis.values(u), &self.control),
+            Err(_) => self.control.first().copied().unwrap_or([0.0; 2]),
+        }
+    }
+
+    /// f~ at many parameters.
+    pub fn evaluate_all(&self, parameters: &[f64]) -> Vec<Point> {
+        let Ok(basis) = Basis::new(&self.knots) else {
+            return parameters.iter().map(|&u| self.evaluate(u)).collect();
+        };
+        let at = |&u: &f64| apply(&basis.values(u), &self.control);
+        parameters.iter().map(at).collect()
+    }
+}
+
+fn check_parameters(parameters: &[f64], points: &[Point], basis: &Basis) -> Result<(), SplineError> {
+    if parameters.len() != points.len() {
+        return Err(SplineError::LengthMismatch {
+            parameters: parameters.len(),
+            points: points.len(),
+        });
+    }
+    let (low, high) = basis.domain();
+    let slack = 1e-12 * (high - low);
+    let outside = parameters
+        .iter()
+        .position(|t| !(low - slack..=high + slack).contains(t));
+    match outside {
+        Some(index) => Err(SplineError::OutsideDomain {
+            index,
+            value: parameters[index],
+            low,
+            high,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The banded solution: where there is freedom for one or two more equations, second derivatives at the ends complete the system, and the
+/// two or one functions that vanish on the data are then used to make the curve smoothest. None where the system is deficient.
+fn banded(basis: &Basis, rows: &[Local], points: &[Point], freedom: usize) -> Option<Vec<Point>> {
+    let ends = end_rows(basis, freedom)?;
+    let solve = |data: &dyn Fn(usize) -> Point, end: [Point; 2]| {
+        let mut system = BandedLeastSquares::new(basis.count());
+        for (i, (first, row)) in rows.iter().enumerate() {
+            system.add(*first, *row, data(i));
+        }
+        for ((first, row), b) in ends.iter().zip(end) {
+            system.add(*first, *row, b);
+        }
+        (system.pivot_ratio() > DEFICIENT).then(|| system.solve())
+    };
+    let mut control = solve(&|i| points[i], [[0.0; 2]; 2])?;
+    if freedom > 0 {
+        let vanishing = solve(&|_| [0.0; 2], [[1.0, 0.0], [0.0, 1.0]])?;
+        let null: Vec<Vec<f64>> = (0..freedom)
+            .map(|f| vanishing.iter().map(|c| c[f]).collect())
+            .collect();
+        smooth(basis, &mut control, &null);
+    }
+    Some(control)
+}
+
+/// f''(start) and f''(end), scaled to unit length; None where more equations than those two are missing.
+fn end_rows(basis: &Basis, freedom: usize) -> Option<Vec<Local>> {
+    let k = basis.count();
+    let (low, high) = basis.domain();
+    let last = basis.span(high);
+    let rows = [
+        basis.second_derivatives(3, low),
+        basis.second_derivatives(last.min(k - 1), high),
+    ];
+    let unit = |(first, row): Local| {
+        let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (first, row.map(|x| x / norm))
+    };
+    (freedom <= 2).then(|| rows.into_iter().take(freedom).map(unit).collect())
+}
+
+/// Adds the mixture of `null` functions (they vanish on the data) that makes the integral of |f''|^2 least.
+fn smooth(basis: &Basis, control: &mut [Point], null: &[Vec<f64>]) {
+    let rows = basis.energy_rows();
+    let bend = |c: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let row = |(first, row): &Local| (0..BAND).map(|j| row[j] * c(first + j)).sum();
+        rows.iter().map(row).collect()
+    };
+    let f = null.len();
+    let bends: Vec<Vec<f64>> = null.iter().map(|z| bend(&|j| z[j])).collect();
+    let system = Mat::from_fn(rows.len().max(f), f, |i, j| {
+        bends[j].get(i).copied().unwrap_or(0.0)
+    });
+    let mut right = Mat::zeros(rows.len().max(f), 2);
+    for axis in 0..2 {
+        for (i, b) in bend(&|j| control[j][axis]).into_iter().enumerate() {
+            right[(i, axis)] = -b;
+        }
+    }
+    let qr = crate::linalg::dense::Qr::new(system);
+    qr.apply_transpose(&mut right);
+    let share = qr.solve_upper(&right);
+    for (z, function) in null.iter().enumerate() {
+        for (c, value) in control.iter_mut().zip(function) {
+            for axis in 0..2 {
+                c[axis] += share[(z, axis)] * value;
+            }
+        }
+    }
+}
+
+/// The solution of least norm by an SVD; where k exceeds the distinct parameters then the smoothest.
+fn dense(basis: &Basis, rows: &[Local], points: &[Point], freedom: usize) -> Result<Vec<Point>, SplineError> {
+    let k = basis.count();
+    // Padded to at least k rows so that the SVD spans the null space too.
+    let mut matrix = Mat::zeros(rows.len().max(k), k);
+    for (i, (first, row)) in rows.iter().enumerate() {
+        for j in 0..BAND {
+            matrix[(i, first + j)] = row[j];
+        }
+    }
+    let svd = thin_svd(matrix.as_ref())?;
+    let rank = svd.s.iter().take_while(|&&s| s > DEFICIENT * svd.s[0]).count();
+    let mut control = vec![[0.0; 2]; k];
+    for r in 0..rank {
+        for axis in 0..2 {
+            let share: f64 = (0..rows.len()).map(|i| svd.u[(i, r)] * points[i][axis]).sum();
+            for j in 0..k {
+                control[j][axis] += svd.v[(j, r)] * share / svd.s[r];
+            }
+        }
+    }
+    if freedom > 0 {
+        let null: Vec<Vec<f64>> = (rank..k)
+            .map(|r| svd.v.col_as_slice(r).to_vec())
+            .collect();
+        smooth(basis, &mut control, &null);
+    }
+    Ok(control)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::knots::{KnotRule, knots};
+    use proptest::prelude::*;
+
+    fn parameters(n: usize) -> Vec<f64> {
+        (0..n).map(|i| i as f64 + 0.3 * (i as f64).sin()).collect()
+    }
+
+    fn cubic(u: f64) -> Point {
+        [1.0 - u + 0.02 * u * u * u, 0.3 * u * u]
+    }
+
+    fn error(spline: &Spline, t: &[f64], p: &[Point]) -> f64 {
+        let d = |(q, p): (Point, &Point)| super::super::distance(q, *p);
+        spline.evaluate_all(t).into_iter().zip(p).map(d).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn cubics_are_reproduced_for_every_number_of_control_points() {
+        let t = parameters(15);
+        let p: Vec<Point> = t.iter().map(|&u| cubic(u)).collect();
+        for k in 4..=15 {
+            let u = knots(&t, k, KnotRule::Symmetric).unwrap();
+            let spline = Spline::fit(&t, &p, &u).unwrap();
+            for q in 0..=100 {
+                let u = t[0] + (t[14] - t[0]) * q as f64 / 100.0;
+                assert!(super::super::distance(spline.evaluate(u), cubic(u)) < 1e-10, "k = {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_control_points_more_than_frames_give_the_natural_spline() {
+        let t = parameters(9);
+        let p: Vec<Point> = t.iter().map(|&u| [u.sin(), (2.0 * u).cos()]).collect();
+        for k in [10, 11] {
+            let u = knots(&t, k, KnotRule::Literal).unwrap();
+            let spline = Spline::fit(&t, &p, &u).unwrap();
+            assert!(error(&spline, &t, &p) < 1e-12, "k = {k}");
+            if k == 11 {
+                let basis = Basis::new(&u).unwrap();
+                for row in end_rows(&basis, 2).unwrap() {
+                    let bend = apply(&row, &spline.control);
+                    assert!(bend[0].abs() < 1e-10 && bend[1].abs() < 1e-10);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn banded_and_dense_routes_agree_on_the_smoothest_curve() {
+        let t = parameters(9);
+        let p: Vec<Point> = t.iter().map(|&u| [u.sin(), (2.0 * u).cos()]).collect();
+        for k in [7, 10, 11] {
+            let u = knots(&t, k, KnotRule::Literal).unwrap();
+            let basis = Basis::new(&u).unwrap();
+            let rows: Vec<Local> = t.iter().map(|&t| basis.values(t)).collect();
+            let freedom = k.saturating_sub(9);
+            let a = banded(&basis, &rows, &p, freedom).unwrap();
+            let b = dense(&basis, &rows, &p, freedom).unwrap();
+            for (a, b) in a.iter().zip(&b) {
+                assert!(super::super::distance(*a, *b) < 1e-9, "k = {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_span_without_data_takes_the_least_norm() {
+        let t = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 9.0, 10.0];
+        let u = [0.0, 0.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 10.0, 10.0];
+        let p: Vec<Point> = t.iter().map(|&u| cubic(u)).collect();
+        let spline = Spline::fit(&t, &p, &u).unwrap();
+        assert!(spline.control.iter().flatten().all(|x| x.abs() < 1e3));
+        assert!(error(&spline, &t, &p) < 1.0);
+    }
+
+    #[test]
+    fn bad_knots_and_parameters_are_named() {
+        let p = [[0.0; 2]; 3];
+        let t = [0.0, 1.0, 2.0];
+        assert!(matches!(Spline::fit(&t, &p, &[0.0; 6]), Err(SplineError::BadKnots { .. })));
+        assert!(matches!(Spline::fit(&t, &p, &[0.0; 3]), Err(SplineError::BadKnots { .. })));
+        let u = [0.0, 0.0, 0.0, 1.5, 1.5, 1.5];
+        assert!(matches!(Spline::fit(&t, &p, &u), Err(SplineError::OutsideDomain { index: 2, .. })));
+        assert!(matches!(Spline::fit(&t, &p[..2], &u), Err(SplineError::LengthMismatch { .. })));
+    }
+
+    proptest! {
+        /// Basis functions are a partition of unity wherever the knots are.
+        #[test]
+        fn partition_of_unity(inner in prop::collection::vec(0.0f64..1.0, 0..8), u in 0.0f64..1.0) {
+            let mut inner = inner;
+            inner.sort_by(f64::total_cmp);
+            let knots: Vec<f64> = [0.0; 3].into_iter().chain(inner).chain([1.0; 3]).collect();
+            let (_, b) = Basis::new(&knots).unwrap().values(u);
+            prop_assert!((b.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            prop_assert!(b.iter().all(|&x| x >= -1e-15));
+        }
+    }
+}

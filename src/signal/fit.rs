@@ -1,0 +1,418 @@
+//! Reconstruction from frames (section 3): each signal in turn minimises its own error.
+
+use std::time::{Duration, Instant};
+
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::Point;
+use super::f::{Spline, SplineError};
+use super::g::{PoseError, PoseSignal};
+use super::h::{ShapeSignal, shape_signal};
+use super::knots::{KnotError, KnotRule, knots};
+use super::mds::{Dissimilarities, scale};
+use super::parameters::{centripetal, distinct};
+use super::pins::{Pin, PinError, principal_start, validate_pins};
+use super::psi::{Representation, TimeSignal};
+use super::sites::{SiteOrder, site_order};
+use crate::linalg::dense::FactorError;
+
+/// Fewest frames that a time signal of four control points can follow.
+pub const FEWEST_FRAMES: usize = 4;
+/// Where (2) exceeds this many times (3) + (4), some sites are nearly coincident and are merged (reading 10).
+const UNSTABLE: f64 = 8.0;
+/// Separations tried then, as shares of the poses' extent.
+const SEPARATIONS: [f64; 9] = [0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2];
+
+/// What to fit with. Ranges: 4 <= k <= n + 2, 3 <= l <= n, 0 <= m <= n - 1 (section 3.4).
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitOptions {
+    /// Control points of the time signal.
+    pub k: usize,
+    /// Sites of the pose signal.
+    pub l: usize,
+    /// Dimension of the shape subspace.
+    pub m: usize,
+    /// Knot rule of the time signal.
+    pub knots: KnotRule,
+    /// Pose-space positions that the user fixes.
+    pub pins: Vec<Pin>,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum FitError {
+    /// Too short a sequence.
+    #[error("expected at least {FEWEST_FRAMES} frames, found {found}; a time signal has at least 4 control points")]
+    TooFewFrames { found: usize },
+    /// k, l or m outside its range.
+    #[error("{name} = {value}, expected {low} <= {name} <= {high} for {frames} frames")]
+    OutOfRange {
+        name: &'static str,
+        value: usize,
+        low: usize,
+        high: usize,
+        frames: usize,
+    },
+    /// See [`PinError`].
+    #[error(transparent)]
+    Pins(#[from] PinError),
+    /// See [`FactorError`].
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+    /// See [`PoseError`].
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// See [`KnotError`].
+    #[error(transparent)]
+    Knots(#[from] KnotError),
+    /// See [`SplineError`].
+    #[error(transparent)]
+    Spline(#[from] SplineError),
+    /// A tolerance that is not a positive number.
+    #[error("tolerance {value}, expected a positive relative RMS such as 0.01")]
+    BadTolerance { value: f64 },
+}
+
+/// The sums of squares that section 3 minimises, in the units of the frames squared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// (3): frames against their projections h(x_i).
+    pub h: f64,
+    /// (4): shape coordinates against g(p_i).
+    pub g: f64,
+    /// (7): pose-space positions against f(i).
+    pub f: f64,
+    /// (2): frames against psi(i).
+    pub psi: f64,
+}
+
+/// Wall time of each stage, as Table 1 counts them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timings {
+    /// Shape signal.
+    pub h: Duration,
+    /// Pose-space positions.
+    pub mds: Duration,
+    /// One radial-basis approximation.
+    pub rbf: Duration,
+    /// The greedy search for the sites.
+    pub g: Duration,
+    /// Parameters, knots and spline.
+    pub f: Duration,
+}
+
+/// A representation, how it was found and how well it fits.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// psi.
+    pub representation: Representation,
+    /// p_1 .. p_n.
+    pub positions: Vec<Point>,
+    /// X, m x n.
+    pub coordinates: Mat<f64>,
+    /// Singular values of the centred frames.
+    pub singular_values: Vec<f64>,
+    /// Frames that became sites, 0-based, in order, with the error (4) of every l.
+    pub sites: SiteOrder,
+    /// Frames nearer than this to a site in pose space were merged with it; 0 where nothing had to be.
+    pub separation: f64,
+    pub errors: Errors,
+    pub timings: Timings,
+}
+
+impl Fit {
+    /// k, l and m as used: m is cut to the rank, l to the poses that are apart, k to two more than the distinct parameters.
+    pub fn klm(&self) -> (usize, usize, usize) {
+        let r = &self.representation;
+        (r.time.spline.control.len(), r.pose.site_count(), r.basis.ncols())
+    }
+}
+
+/// Runs something and takes its time.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let start = Instant::now();
+    let result = work();
+    (result, start.elapsed())
+}
+
+/// Fits the representation to `frames` (d x n): h, then p by scaling, then g, then f, with (2) to (7) measured at the end.
+///
+/// Repeated and nearly repeated poses follow two rules (reading 10). Frames at one pose-space position make one site. And where (2) exceeds
+/// [`UNSTABLE`] times (3) + (4) - the mark of nearly coincident sites, between which g swings - sites nearer than a separation are merged, the one
+/// of a fixed ladder of separations (shares of the poses' extent) that makes (2) least.
+pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitError> {
+    check_ranges(frames.ncols(), options)?;
+    validate_pins(&options.pins, frames.ncols())?;
+    let base = Base::new(frames, options.m, &options.pins)?;
+    base.fit(options.k, options.l, options.knots)
+}
+
+fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
+    if n < FEWEST_FRAMES {
+        return Err(FitError::TooFewFrames { found: n });
+    }
+    let ranges = [("k", options.k, 4, n + 2), ("l", options.l, 3, n), ("m", options.m, 0, n - 1)];
+    for (name, value, low, high) in ranges {
+        if value < low || value > high {
+            return Err(FitError::OutOfRange {
+                name,
+                value,
+                low,
+                high,
+                frames: n,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What k and l do not change: the shape signal and the pose-space positions.
+pub(super) struct Base {
+    shape: ShapeSignal,
+    positions: Vec<Point>,
+    parameters: Vec<f64>,
+    error_h: f64,
+    timings: Timings,
+}
+
+impl Base {
+    pub(super) fn new(frames: MatRef<'_, f64>, m: usize, pins: &[Pin]) -> Result<Self, FitError> {
+        let (shape, h) = timed(|| shape_signal(frames, m));
+        let shape = shape?;
+        let error_h = error_h(frames, &shape);
+        Ok(Self::from_shape(shape, error_h, h, pins))
+    }
+
+    /// From a shape signal already found, with its error (3).
+    pub(super) fn from_shape(shape: ShapeSignal, error_h: f64, h: Duration, pins: &[Pin]) -> Self {
+        let x = shape.coordinates.as_ref();
+        let (positions, mds) = timed(|| {
+            let delta = Dissimilarities::new(x);
+            scale(&delta, &principal_start(x, pins), pins)
+        });
+        Self {
+            parameters: frame_parameters(&positions),
+            shape,
+            positions,
+            error_h,
+            timings: Timings {
+                h,
+                mds,
+                ..Timings::default()
+            },
+        }
+    }
+
+    /// m.
+    pub(super) fn dimension(&self) -> usize {
+        self.shape.basis.ncols()
+    }
+
+    /// The greatest k that the distinct parameters allow.
+    pub(super) fn most_control_points(&self) -> usize {
+        distinct(&self.parameters).len() + 2
+    }
+
+    /// Extent of the poses: the greatest distance from the first.
+    fn extent(&self) -> f64 {
+        let reach = |p: &Point| super::distance(*p, self.positions[0]);
+        self.positions.iter().map(reach).fold(0.0, f64::max)
+    }
+
+    /// The sites for at most `count` of them.
+    pub(super) fn order(&self, count: usize, separation: f64) -> Result<SiteOrder, FactorError> {
+        site_order(&self.positions, self.shape.coordinates.as_ref(), count, separation)
+    }
+
+    pub(super) fn fit(self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {
+        let first = self.attempt(k, l, rule, 0.0)?;
+        let settled = |a: &Attempt| a.errors.psi <= UNSTABLE * (a.errors.h + a.errors.g);
+        let mut best = first;
+        if !settled(&best) {
+            let extent = self.extent();
+            for share in SEPARATIONS {
+                let next = self.attempt(k, l, rule, share * extent)?;
+                if next.errors.psi < best.errors.psi {
+                    best = next;
+                }
+            }
+        }
+        Ok(self.finish(best))
+    }
+
+    fn attempt(&self, k: usize, l: usize, rule: KnotRule, separation: f64) -> Result<Attempt, FitError> {
+        let (order, g) = timed(|| self.order(l, separation));
+        let order = order?;
+        let mut attempt = self.signals(k, &order.order, rule)?;
+        attempt.timings.g = g;
+        attempt.sites = order;
+        attempt.separation = separation;
+        Ok(attempt)
+    }
+
+    /// g for these sites and f for k control points, with their errors.
+    pub(super) fn signals(&self, k: usize, sites: &[usize], rule: KnotRule) -> Result<Attempt, FitError> {
+        let x = self.shape.coordinates.as_ref();
+        let (pose, rbf) = timed(|| PoseSignal::fit(&self.positions, x, sites));
+        let pose = pose?;
+        let (spline, f) = timed(|| self.spline(k, rule));
+        let spline = spline?;
+        let curve = spline.evaluate_all(&self.parameters);
+        let gap = |(a, b): (&Point, &Point)| super::distance(*a, *b).powi(2);
+        let errors = Errors {
+            h: self.error_h,
+            g: (pose.evaluate(&self.positions) - x).squared_norm_l2(),
+            f: self.positions.iter().zip(&curve).map(gap).sum(),
+            // H is orthonormal and (3) the least, so what h leaves is orthogonal to what g and f leave.
+            psi: self.error_h + (pose.evaluate(&curve) - x).squared_norm_l2(),
+        };
+        Ok(Attempt {
+            pose,
+            spline,
+            errors,
+            sites: SiteOrder {
+                order: Vec::new(),
+                errors: Vec::new(),
+            },
+            separation: 0.0,
+            timings: Timings {
+                rbf,
+                f,
+                ..self.timings
+            },
+        })
+    }
+
+    fn spline(&self, k: usize, rule: KnotRule) -> Result<Spline, FitError> {
+        let t = distinct(&self.parameters);
+        let u = knots(&t, k.min(t.len() + 2), rule)?;
+        Ok(Spline::fit(&self.parameters, &self.positions, &u)?)
+    }
+
+    pub(super) fn finish(self, attempt: Attempt) -> Fit {
+        Fit {
+            representation: Representation {
+                time: TimeSignal::new(attempt.spline, self.parameters),
+                pose: attempt.pose,
+                offset: self.shape.offset,
+                basis: self.shape.basis,
+            },
+            positions: self.positions,
+            coordinates: self.shape.coordinates,
+            singular_values: self.shape.singular_values,
+            sites: attempt.sites,
+            separation: attempt.separation,
+            errors: attempt.errors,
+            timings: attempt.timings,
+        }
+    }
+}
+
+/// Signals for one choice of k and sites.
+pub(super) struct Attempt {
+    pose: PoseSignal,
+    spline: Spline,
+    pub(super) errors: Errors,
+    pub(super) sites: SiteOrder,
+    separation: f64,
+    timings: Timings,
+}
+
+/// Centripetal parameters; where all poses coincide every parameter would be 0, and the frame number serves instead.
+fn frame_parameters(positions: &[Point]) -> Vec<f64> {
+    let t = centripetal(positions);
+    if distinct(&t).len() > 1 {
+        t
+    } else {
+        (0..positions.len()).map(|i| i as f64).collect()
+    }
+}
+
+/// (3), frame by frame from the frames themselves. O(n d m).
+pub(super) fn error_h(frames: MatRef<'_, f64>, shape: &ShapeSignal) -> f64 {
+    let d = frames.nrows();
+    let frame_error = |i: usize| {
+        let mut left: Vec<f64> = (0..d).map(|a| frames[(a, i)] - shape.offset[a]).collect();
+        let x: Vec<f64> = (0..shape.basis.ncols()).map(|j| -shape.coordinates[(j, i)]).collect();
+        crate::linalg::kernels::combine(&x, |j| shape.basis.col_as_slice(j), &mut left);
+        crate::linalg::kernels::norm_squared(&left)
+    };
+    let each: Vec<f64> = (0..frames.ncols()).into_par_iter().map(frame_error).collect();
+    each.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(n: usize) -> Mat<f64> {
+        Mat::from_fn(30, n, |a, i| {
+            let t = i as f64 * 0.5;
+            ((a + 1) as f64 * 0.2 * t).sin() + (t + a as f64).cos() + 0.05 * a as f64
+        })
+    }
+
+    fn options(k: usize, l: usize, m: usize) -> FitOptions {
+        FitOptions {
+            k,
+            l,
+            m,
+            knots: KnotRule::Literal,
+            pins: Vec::new(),
+        }
+    }
+
+    fn measured(frames: &Mat<f64>, fit: &Fit) -> f64 {
+        let times: Vec<f64> = (1..=frames.ncols()).map(|i| i as f64).collect();
+        let values = fit.representation.evaluate(&times);
+        let rebuilt = MatRef::from_column_major_slice(&values, frames.nrows(), frames.ncols());
+        (frames - rebuilt).squared_norm_l2()
+    }
+
+    #[test]
+    fn interpolating_signals_reproduce_every_frame() {
+        let z = frames(12);
+        for knots in [KnotRule::Literal, KnotRule::Symmetric] {
+            let fit = fit(z.as_ref(), &FitOptions { knots, ..options(14, 12, 11) }).unwrap();
+            assert!(fit.errors.psi < 1e-18 * z.squared_norm_l2(), "{:?}", fit.errors);
+            assert!(measured(&z, &fit) < 1e-18 * z.squared_norm_l2());
+        }
+    }
+
+    #[test]
+    fn errors_are_what_the_representation_leaves() {
+        let z = frames(20);
+        for (k, l, m) in [(10, 8, 3), (4, 3, 0), (22, 20, 19), (21, 5, 1), (4, 3, 2), (22, 3, 0)] {
+            let fit = fit(z.as_ref(), &options(k, l, m)).unwrap();
+            let found = measured(&z, &fit);
+            let scale = 1e-10 * z.squared_norm_l2();
+            assert!((found - fit.errors.psi).abs() < scale, "{k} {l} {m}: {found} {:?}", fit.errors);
+        }
+    }
+
+    #[test]
+    fn repeated_frames_fit_as_well_as_single_ones() {
+        let once = frames(12);
+        let twice = Mat::from_fn(30, 24, |a, i| once[(a, i % 12)]);
+        let held = Mat::from_fn(30, 24, |a, i| once[(a, i / 2)]);
+        for z in [twice, held] {
+            let fit = fit(z.as_ref(), &options(26, 24, 23)).unwrap();
+            assert!(fit.errors.psi < 1e-9 * z.squared_norm_l2(), "{:?}", fit.errors);
+        }
+        let still = Mat::from_fn(30, 6, |a, _| a as f64);
+        let fit = fit(still.as_ref(), &options(8, 6, 5)).unwrap();
+        assert_eq!(fit.klm(), (8, 1, 0));
+        assert!(fit.errors.psi < 1e-20);
+    }
+
+    #[test]
+    fn ranges_are_checked_and_named() {
+        let z = frames(8);
+        for (o, name) in [(options(3, 4, 2), "k"), (options(11, 4, 2), "k"), (options(6, 2, 2), "l"), (options(6, 4, 8), "m")] {
+            assert!(matches!(fit(z.as_ref(), &o), Err(FitError::OutOfRange { name: found, .. }) if found == name));
+        }
+        assert_eq!(fit(frames(3).as_ref(), &options(4, 3, 0)).unwrap_err(), FitError::TooFewFrames { found: 3 });
+    }
+}

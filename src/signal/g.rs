@@ -1,0 +1,249 @@
+//! The pose signal g: a thin-plate approximation from the pose plane to shape coordinates (sections 2.2 and 3.2).
+
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::Point;
+use super::thin_plate::{Frame, between};
+use crate::linalg::dense::Qr;
+use crate::linalg::kernels::{axpy, combine};
+
+/// Sites closer than this share of their extent coincide.
+const COINCIDENT: f64 = 1e-13;
+
+/// g(p) = g_0 + sum_j phi(||s_j - p||) g_j + G p, with phi(r) = r^2 ln r, in the units of the pose-space positions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseSignal {
+    /// s_1 .. s_l.
+    pub sites: Vec<Point>,
+    /// m x (l + 3): the columns are g_0, g_1 .. g_l, and the two columns of G.
+    pub coefficients: Mat<f64>,
+}
+
+/// Why there is no pose signal for these sites.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum PoseError {
+    /// No site at all.
+    #[error("a pose signal needs at least one site, found none")]
+    NoSites,
+    /// A site that is not one of the points.
+    #[error("site {site} (0-based) is index {index}, but there are {points} points")]
+    OutOfRange {
+        site: usize,
+        index: usize,
+        points: usize,
+    },
+    /// Two sites at one place, which makes the system singular.
+    #[error("sites {first} and {second} (0-based, of the list of sites) coincide in pose space; keep one of them")]
+    Coincident { first: usize, second: usize },
+}
+
+impl PoseSignal {
+    /// Minimises (4) over all frames for sites at `points[sites[j]]`, under the side conditions sum_j g_j = 0 and sum_j g_j s_j^T = 0 (reading 4).
+    ///
+    /// `coordinates` is m x n with a column for each of the n points. Through the QR of the l x 3 matrix [1 s], whose null space leaves an n x l
+    /// system, solved by another QR: O(n l^2). With l = 3 sites an affine map; with l = n an interpolant. Where the sites do not span the plane
+    /// (collinear or coincident), g is constant across them.
+    pub fn fit(
+        points: &[Point],
+        coordinates: MatRef<'_, f64>,
+        sites: &[usize],
+    ) -> Result<Self, PoseError> {
+        let chosen = choose(points, sites)?;
+        let frame = Frame::new(&chosen);
+        let normalised: Vec<Point> = chosen.iter().map(|&p| frame.normalise(p)).collect();
+        check_apart(&normalised)?;
+        let (l, affine) = (chosen.len(), frame.affine);
+        let columns = |q: Point| [1.0, q[0], q[1]];
+        let side = Qr::new(Mat::from_fn(l, affine, |j, a| columns(normalised[j])[a]));
+        let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
+        let mut kernels = Mat::from_fn(l, points.len(), |j, i| between(normalised[j], queries[i]));
+        side.apply_transpose(&mut kernels);
+        let system = Mat::from_fn(points.len(), l, |i, j| {
+            if j < affine {
+                columns(queries[i])[j]
+            } else {
+                kernels[(j, i)]
+            }
+        });
+        let mut right = coordinates.transpose().to_owned();
+        let qr = Qr::new(system);
+        qr.apply_transpose(&mut right);
+        let solution = qr.solve_upper(&right);
+        let mut weights = Mat::from_fn(l, coordinates.nrows(), |j, a| {
+            if j < affine { 0.0 } else { solution[(j, a)] }
+        });
+        side.apply(&mut weights);
+        let affine_part = solution.get(..affine, ..);
+        Ok(Self {
+            coefficients: in_given_units(&frame, &normalised, &weights, affine_part),
+            sites: chosen,
+        })
+    }
+
+    /// l, the number of sites.
+    pub fn site_count(&self) -> usize {
+        self.sites.len()
+    }
+
+    /// Adds nothing to `x` but g(p): `x` holds m numbers and is overwritten. O(l m).
+    pub fn evaluate_into(&self, p: Point, x: &mut [f64]) {
+        let l = self.sites.len();
+        x.copy_from_slice(self.coefficients.col_as_slice(0));
+        let kernels: Vec<f64> = self.sites.iter().map(|&s| between(s, p)).collect();
+        combine(&kernels, |j| self.coefficients.col_as_slice(j + 1), x);
+        axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
+        axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
+    }
+
+    /// g at many points, m x q.
+    pub fn evaluate(&self, points: &[Point]) -> Mat<f64> {
+        let m = self.coefficients.nrows();
+        let mut values = vec![0.0; m * points.len()];
+        if m > 0 {
+            values
+                .par_chunks_mut(m)
+                .zip(points)
+                .with_min_len(16)
+                .for_each(|(x, &p)| self.evaluate_into(p, x));
+        }
+        MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
+    }
+}
+
+fn choose(points: &[Point], sites: &[usize]) -> Result<Vec<Point>, PoseError> {
+    if sites.is_empty() {
+        return Err(PoseError::NoSites);
+    }
+    let at = |(site, &index): (usize, &usize)| {
+        points.get(index).copied().ok_or(PoseError::OutOfRange {
+            site,
+            index,
+            points: points.len(),
+        })
+    };
+    sites.iter().enumerate().map(at).collect()
+}
+
+/// Sorted along the longer axis, coincident sites are neighbours up to ties.
+fn check_apart(normalised: &[Point]) -> Result<(), PoseError> {
+    let mut order: Vec<usize> = (0..normalised.len()).collect();
+    order.sort_by(|&a, &b| normalised[a][0].total_cmp(&normalised[b][0]));
+    for (k, &a) in order.iter().enumerate() {
+        let near = order[k + 1..]
+            .iter()
+            .take_while(|&&b| normalised[b][0] - normalised[a][0] <= COINCIDENT);
+        for &b in near {
+            if (normalised[a][1] - normalised[b][1]).abs() <= COINCIDENT {
+                return Err(PoseError::Coincident {
+                    first: a.min(b),
+                    second: a.max(b),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Coefficients in the units of the points: with q = (p - c) / s, phi(r / s) = (phi(r) - r^2 ln s) / s^2, and the side conditions turn
+/// sum_j c_j ||p - s_j||^2 into the constant sum_j c_j ||s_j - c||^2.
+fn in_given_units(
+    frame: &Frame,
+    normalised: &[Point],
+    weights: &Mat<f64>,
+    affine: MatRef<'_, f64>,
+) -> Mat<f64> {
+    let (l, m) = weights.shape();
+    let s = frame.size;
+    let mut out = Mat::zeros(m, l + 3);
+    for a in 0..m {
+        let along = |axis: usize| {
+            if axis + 1 < frame.affine {
+                affine[(axis + 1, a)]
+            } else {
+                0.0
+            }
+        };
+        let gradient = frame.axes * nalgebra::Vector2::new(along(0), along(1)) / s;
+        let spread: f64 = (0..l)
+            .map(|j| weights[(j, a)] * (normalised[j][0].powi(2) + normalised[j][1].powi(2)))
+            .sum();
+        out[(a, 0)] = affine[(0, a)] - gradient.dot(&frame.centre) - spread * s.ln();
+        for j in 0..l {
+            out[(a, j + 1)] = weights[(j, a)] / (s * s);
+        }
+        out[(a, l + 1)] = gradient[0];
+        out[(a, l + 2)] = gradient[1];
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn points(n: usize) -> Vec<Point> {
+        (0..n)
+            .map(|i| [30.0 * (i as f64 * 1.3).sin() + 100.0, 20.0 * (i as f64 * 0.7).cos()])
+            .collect()
+    }
+
+    fn shapes(n: usize) -> Mat<f64> {
+        Mat::from_fn(3, n, |a, i| ((i * (a + 2)) as f64 * 0.3).sin())
+    }
+
+    #[test]
+    fn all_sites_interpolate_and_keep_the_side_conditions() {
+        let (p, x) = (points(15), shapes(15));
+        let g = PoseSignal::fit(&p, x.as_ref(), &(0..15).collect::<Vec<_>>()).unwrap();
+        assert!((g.evaluate(&p) - &x).norm_max() < 1e-9);
+        for a in 0..3 {
+            let sum = |f: &dyn Fn(usize) -> f64| (0..15).map(|j| g.coefficients[(a, j + 1)] * f(j)).sum::<f64>();
+            let size = g.coefficients.norm_max() * 100.0;
+            assert!(sum(&|_| 1.0).abs() < 1e-12 * size);
+            assert!(sum(&|j| p[j][0]).abs() < 1e-12 * size * 100.0);
+            assert!(sum(&|j| p[j][1]).abs() < 1e-12 * size * 100.0);
+        }
+    }
+
+    #[test]
+    fn three_sites_give_the_affine_fit() {
+        let p = points(10);
+        let x = Mat::from_fn(2, 10, |a, i| 1.0 + p[i][0] * 0.3 - p[i][1] * (a as f64 + 0.1));
+        let g = PoseSignal::fit(&p, x.as_ref(), &[0, 4, 7]).unwrap();
+        assert!((g.evaluate(&p) - &x).norm_max() < 1e-11);
+    }
+
+    #[test]
+    fn collinear_and_coincident_points_are_handled() {
+        let line: Vec<Point> = (0..6).map(|i| [i as f64, 2.0 * i as f64]).collect();
+        let x = shapes(6);
+        let g = PoseSignal::fit(&line, x.as_ref(), &[0, 1, 2, 3, 4, 5]).unwrap();
+        assert!((g.evaluate(&line) - &x).norm_max() < 1e-9);
+        let one = PoseSignal::fit(&[[1.0, 1.0]; 6], x.as_ref(), &[2]).unwrap();
+        let mean = (0..6).map(|i| x[(0, i)]).sum::<f64>() / 6.0;
+        assert!((one.evaluate(&[[1.0, 1.0]])[(0, 0)] - mean).abs() < 1e-12);
+        assert_eq!(
+            PoseSignal::fit(&[[1.0, 1.0], [0.0, 0.0], [1.0, 1.0]], shapes(3).as_ref(), &[0, 1, 2]),
+            Err(PoseError::Coincident { first: 0, second: 2 })
+        );
+    }
+
+    proptest! {
+        /// Scale and place do not matter: g(s p + c) of moved positions is g(p).
+        #[test]
+        fn equivariant_under_similarity(s in 1e-3f64..1e3, cx in -5.0f64..5.0, cy in -5.0f64..5.0, turn in 0.0f64..6.28) {
+            let (p, x) = (points(14), shapes(14));
+            let moved: Vec<Point> = p.iter().map(|q| [
+                s * (turn.cos() * q[0] - turn.sin() * q[1] + cx),
+                s * (turn.sin() * q[0] + turn.cos() * q[1] + cy),
+            ]).collect();
+            let sites = [0, 3, 5, 6, 9, 11, 13];
+            let a = PoseSignal::fit(&p, x.as_ref(), &sites).unwrap();
+            let b = PoseSignal::fit(&moved, x.as_ref(), &sites).unwrap();
+            prop_assert!((a.evaluate(&p) - b.evaluate(&moved)).norm_max() < 1e-8);
+        }
+    }
+}

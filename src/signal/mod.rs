@@ -1,0 +1,37 @@
+//! Cashman & Hormann 2012, *A continuous, editable representation for deforming mesh sequences with separate signals for time, pose and
+//! shape*: psi = h o g o f (equation (1)).
+//!
+//! | paper | here |
+//! |---|---|
+//! | 2.1, 3.1 shape signal h | [`h`] |
+//! | 3.2.1 pose-space positions | [`mds`] |
+//! | 2.2, 3.2 pose signal g | [`g`] |
+//! | 3.2.2 site order | [`sites`] |
+//! | 2.3, 3.3 time signal f: parameters, knots, spline, rho | [`parameters`], [`knots`], [`f`], [`rho`] |
+//! | 2.4 the chain psi | [`psi`] |
+//! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
+//! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//!
+//! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
+//! text is off, `docs/READINGS.md` says how it is read; "reading r" below is its number r.
+
+pub mod f;
+pub mod fidelity;
+pub mod fit;
+pub mod g;
+pub mod h;
+pub mod knots;
+pub mod mds;
+pub mod parameters;
+pub mod pins;
+pub mod psi;
+pub mod rho;
+pub mod sites;
+pub mod thin_plate;
+
+/// A point of the pose plane.
+pub type Point = [f64; 2];
+
+pub(crate) fn distance(a: Point, b: Point) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}

@@ -1,0 +1,100 @@
+//! The whole chain psi = h o g o f (equation (1), section 2.4): the representation of a deforming mesh sequence.
+
+use faer::Mat;
+use rayon::prelude::*;
+
+use super::Point;
+use super::f::Spline;
+use super::g::PoseSignal;
+use super::rho::Rho;
+use crate::linalg::kernels::combine;
+
+/// Numbers of a frame worked on at a time, so that they stay in cache while H is read once.
+const BLOCK: usize = 1024;
+
+/// The time signal f = f~ o rho (section 2.3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeSignal {
+    /// f~: control points and knots.
+    pub spline: Spline,
+    /// t_1 .. t_n, the parameters of the frames.
+    pub parameters: Vec<f64>,
+    rho: Rho,
+}
+
+impl TimeSignal {
+    /// Joins a spline and the frames' non-decreasing parameters.
+    pub fn new(spline: Spline, parameters: Vec<f64>) -> Self {
+        Self {
+            rho: Rho::new(&parameters),
+            spline,
+            parameters,
+        }
+    }
+
+    /// f(t) for a frame time t in [1, n]; beyond the ends the end poses hold.
+    pub fn evaluate(&self, t: f64) -> Point {
+        self.spline.evaluate(self.rho.evaluate(t))
+    }
+
+    /// n, the number of frames represented.
+    pub fn frame_count(&self) -> usize {
+        self.parameters.len()
+    }
+}
+
+/// Separate signals for time, pose and shape; `evaluate` is psi.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Representation {
+    /// f, in time: [1, n] -> R^2.
+    pub time: TimeSignal,
+    /// g, in pose: R^2 -> R^m.
+    pub pose: PoseSignal,
+    /// h_0, d numbers.
+    pub offset: Vec<f64>,
+    /// H, d x m: h(x) = h_0 + H x.
+    pub basis: Mat<f64>,
+}
+
+impl Representation {
+    /// d, the numbers in a frame.
+    pub fn dimension(&self) -> usize {
+        self.offset.len()
+    }
+
+    /// h(x) into `frame` (d numbers), reading H once. O(d m).
+    pub fn shape_into(&self, x: &[f64], frame: &mut [f64]) {
+        frame.par_chunks_mut(BLOCK).with_min_len(4).enumerate().for_each(|(b, block)| {
+            let rows = b * BLOCK..b * BLOCK + block.len();
+            block.copy_from_slice(&self.offset[rows.clone()]);
+            combine(x, |j| &self.basis.col_as_slice(j)[rows.clone()], block);
+        });
+    }
+
+    /// psi(t) into `frame` (d numbers), for a frame time t in [1, n]. O(l m + d m).
+    pub fn evaluate_into(&self, t: f64, frame: &mut [f64]) {
+        let mut x = vec![0.0; self.basis.ncols()];
+        self.pose.evaluate_into(self.time.evaluate(t), &mut x);
+        self.shape_into(&x, frame);
+    }
+
+    /// psi at many times, d numbers a time, in parallel over the times.
+    pub fn evaluate(&self, times: &[f64]) -> Vec<f64> {
+        let mut frames = vec![0.0; self.dimension() * times.len()];
+        if self.dimension() > 0 {
+            frames
+                .par_chunks_mut(self.dimension())
+                .zip(times)
+                .for_each(|(frame, &t)| self.evaluate_into(t, frame));
+        }
+        frames
+    }
+
+    /// How many numbers the representation stores: signals, knots and parameters.
+    pub fn stored_numbers(&self) -> usize {
+        let (d, m) = self.basis.shape();
+        let l = self.pose.site_count();
+        let k = self.time.spline.control.len();
+        d * (m + 1) + m * (l + 3) + 2 * l + 2 * k + (k + 2) + self.time.frame_count()
+    }
+}
