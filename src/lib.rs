@@ -13,6 +13,7 @@
 //! | [`report`] | plots and the HTML report |
 //! | [`cmd`] | the command line, one file a verb |
 
+pub mod harness;
 pub mod linalg;
 pub mod mesh;
 pub mod sequence;

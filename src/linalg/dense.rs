@@ -9,7 +9,9 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum FactorError {
     /// The iteration for eigenvalues or singular values did not settle, which non-finite or extreme entries can cause.
-    #[error("the {factorisation} of a {rows} x {columns} matrix did not converge; look for extreme values in the input")]
+    #[error(
+        "the {factorisation} of a {rows} x {columns} matrix did not converge; look for extreme values in the input"
+    )]
     NoConvergence {
         factorisation: &'static str,
         rows: usize,
@@ -178,7 +180,9 @@ mod tests {
     use super::*;
 
     fn sample(rows: usize, columns: usize) -> Mat<f64> {
-        Mat::from_fn(rows, columns, |i, j| ((i + 2) as f64 * (j as f64 + 0.7)).sin())
+        Mat::from_fn(rows, columns, |i, j| {
+            ((i + 2) as f64 * (j as f64 + 0.7)).sin()
+        })
     }
 
     #[test]

@@ -102,7 +102,11 @@ mod tests {
     fn dot_and_combine_match_plain_sums() {
         for n in [0, 1, 7, 8, 9, 31] {
             let columns: Vec<Vec<f64>> = (0..6)
-                .map(|j| (0..n).map(|i| ((i * 7 + j * 3) % 11) as f64 - 4.0).collect())
+                .map(|j| {
+                    (0..n)
+                        .map(|i| ((i * 7 + j * 3) % 11) as f64 - 4.0)
+                        .collect()
+                })
                 .collect();
             let plain: f64 = columns[0].iter().zip(&columns[1]).map(|(a, b)| a * b).sum();
             assert_eq!(dot(&columns[0], &columns[1]), plain);

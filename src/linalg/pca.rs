@@ -59,15 +59,17 @@ fn empty(mean: Vec<f64>, d: usize, n: usize) -> Pca {
 fn mean(samples: MatRef<'_, f64>) -> Vec<f64> {
     let (d, n) = samples.shape();
     let mut mean = vec![0.0; d];
-    mean.par_chunks_mut(BLOCK).enumerate().for_each(|(b, mean)| {
-        for j in 0..n {
-            let column = samples.get(b * BLOCK..b * BLOCK + mean.len(), j);
-            for (sum, x) in mean.iter_mut().zip(column.iter()) {
-                *sum += x;
+    mean.par_chunks_mut(BLOCK)
+        .enumerate()
+        .for_each(|(b, mean)| {
+            for j in 0..n {
+                let column = samples.get(b * BLOCK..b * BLOCK + mean.len(), j);
+                for (sum, x) in mean.iter_mut().zip(column.iter()) {
+                    *sum += x;
+                }
             }
-        }
-        mean.iter_mut().for_each(|x| *x /= n as f64);
-    });
+            mean.iter_mut().for_each(|x| *x /= n as f64);
+        });
     mean
 }
 
@@ -191,9 +193,10 @@ fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
     (0..basis.ncols())
         .map(|j| {
             let column = basis.col_as_slice_mut(j);
-            let largest = column
-                .iter()
-                .fold(0.0f64, |best, &x| if x.abs() > best.abs() { x } else { best });
+            let largest = column.iter().fold(
+                0.0f64,
+                |best, &x| if x.abs() > best.abs() { x } else { best },
+            );
             if largest < 0.0 {
                 column.iter_mut().for_each(|x| *x = -*x);
                 -1.0

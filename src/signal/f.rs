@@ -24,13 +24,17 @@ pub struct Spline {
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum SplineError {
     /// Too few knots or knots that decrease.
-    #[error("expected at least 6 non-decreasing finite knots with u_2 < u_(k-1), found {found} knots of which number {at} (0-based) breaks this")]
+    #[error(
+        "expected at least 6 non-decreasing finite knots with u_2 < u_(k-1), found {found} knots of which number {at} (0-based) breaks this"
+    )]
     BadKnots { found: usize, at: usize },
     /// Another number of parameters than of points.
     #[error("expected a parameter for each of {points} points, found {parameters}")]
     LengthMismatch { parameters: usize, points: usize },
     /// A parameter outside the domain.
-    #[error("parameter {index} (0-based) is {value}, outside the domain [{low}, {high}] of the knots")]
+    #[error(
+        "parameter {index} (0-based) is {value}, outside the domain [{low}, {high}] of the knots"
+    )]
     OutsideDomain {
         index: usize,
         value: f64,
@@ -115,7 +119,11 @@ impl Basis {
         for (q, weight) in hat.iter().enumerate() {
             // Coefficient q of the second derivative on this span takes coefficients s-3+q .. s-1+q.
             let i = s - 1 + q;
-            let wide = [6.0 / (t[i + 2] - t[i]), 1.0 / (t[i + 2] - t[i - 1]), 1.0 / (t[i + 3] - t[i])];
+            let wide = [
+                6.0 / (t[i + 2] - t[i]),
+                1.0 / (t[i + 2] - t[i - 1]),
+                1.0 / (t[i + 3] - t[i]),
+            ];
             row[q] += weight * wide[0] * wide[1];
             row[q + 1] -= weight * wide[0] * (wide[1] + wide[2]);
             row[q + 2] += weight * wide[0] * wide[2];
@@ -186,7 +194,11 @@ impl Spline {
     }
 }
 
-fn check_parameters(parameters: &[f64], points: &[Point], basis: &Basis) -> Result<(), SplineError> {
+fn check_parameters(
+    parameters: &[f64],
+    points: &[Point],
+    basis: &Basis,
+) -> Result<(), SplineError> {
     if parameters.len() != points.len() {
         return Err(SplineError::LengthMismatch {
             parameters: parameters.len(),
@@ -281,7 +293,12 @@ fn smooth(basis: &Basis, control: &mut [Point], null: &[Vec<f64>]) {
 }
 
 /// The solution of least norm by an SVD; where k exceeds the distinct parameters then the smoothest.
-fn dense(basis: &Basis, rows: &[Local], points: &[Point], freedom: usize) -> Result<Vec<Point>, SplineError> {
+fn dense(
+    basis: &Basis,
+    rows: &[Local],
+    points: &[Point],
+    freedom: usize,
+) -> Result<Vec<Point>, SplineError> {
     let k = basis.count();
     // Padded to at least k rows so that the SVD spans the null space too.
     let mut matrix = Mat::zeros(rows.len().max(k), k);
@@ -291,20 +308,24 @@ fn dense(basis: &Basis, rows: &[Local], points: &[Point], freedom: usize) -> Res
         }
     }
     let svd = thin_svd(matrix.as_ref())?;
-    let rank = svd.s.iter().take_while(|&&s| s > DEFICIENT * svd.s[0]).count();
+    let rank = svd
+        .s
+        .iter()
+        .take_while(|&&s| s > DEFICIENT * svd.s[0])
+        .count();
     let mut control = vec![[0.0; 2]; k];
     for r in 0..rank {
         for axis in 0..2 {
-            let share: f64 = (0..rows.len()).map(|i| svd.u[(i, r)] * points[i][axis]).sum();
+            let share: f64 = (0..rows.len())
+                .map(|i| svd.u[(i, r)] * points[i][axis])
+                .sum();
             for j in 0..k {
                 control[j][axis] += svd.v[(j, r)] * share / svd.s[r];
             }
         }
     }
     if freedom > 0 {
-        let null: Vec<Vec<f64>> = (rank..k)
-            .map(|r| svd.v.col_as_slice(r).to_vec())
-            .collect();
+        let null: Vec<Vec<f64>> = (rank..k).map(|r| svd.v.col_as_slice(r).to_vec()).collect();
         smooth(basis, &mut control, &null);
     }
     Ok(control)
@@ -326,7 +347,12 @@ mod tests {
 
     fn error(spline: &Spline, t: &[f64], p: &[Point]) -> f64 {
         let d = |(q, p): (Point, &Point)| super::super::distance(q, *p);
-        spline.evaluate_all(t).into_iter().zip(p).map(d).fold(0.0, f64::max)
+        spline
+            .evaluate_all(t)
+            .into_iter()
+            .zip(p)
+            .map(d)
+            .fold(0.0, f64::max)
     }
 
     #[test]
@@ -338,7 +364,10 @@ mod tests {
             let spline = Spline::fit(&t, &p, &u).unwrap();
             for q in 0..=100 {
                 let u = t[0] + (t[14] - t[0]) * q as f64 / 100.0;
-                assert!(super::super::distance(spline.evaluate(u), cubic(u)) < 1e-10, "k = {k}");
+                assert!(
+                    super::super::distance(spline.evaluate(u), cubic(u)) < 1e-10,
+                    "k = {k}"
+                );
             }
         }
     }
@@ -392,11 +421,23 @@ mod tests {
     fn bad_knots_and_parameters_are_named() {
         let p = [[0.0; 2]; 3];
         let t = [0.0, 1.0, 2.0];
-        assert!(matches!(Spline::fit(&t, &p, &[0.0; 6]), Err(SplineError::BadKnots { .. })));
-        assert!(matches!(Spline::fit(&t, &p, &[0.0; 3]), Err(SplineError::BadKnots { .. })));
+        assert!(matches!(
+            Spline::fit(&t, &p, &[0.0; 6]),
+            Err(SplineError::BadKnots { .. })
+        ));
+        assert!(matches!(
+            Spline::fit(&t, &p, &[0.0; 3]),
+            Err(SplineError::BadKnots { .. })
+        ));
         let u = [0.0, 0.0, 0.0, 1.5, 1.5, 1.5];
-        assert!(matches!(Spline::fit(&t, &p, &u), Err(SplineError::OutsideDomain { index: 2, .. })));
-        assert!(matches!(Spline::fit(&t, &p[..2], &u), Err(SplineError::LengthMismatch { .. })));
+        assert!(matches!(
+            Spline::fit(&t, &p, &u),
+            Err(SplineError::OutsideDomain { index: 2, .. })
+        ));
+        assert!(matches!(
+            Spline::fit(&t, &p[..2], &u),
+            Err(SplineError::LengthMismatch { .. })
+        ));
     }
 
     proptest! {

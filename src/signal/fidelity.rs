@@ -33,7 +33,10 @@ pub fn fit_to_error(
     let start = Instant::now();
     let whole = shape_signal(frames, n - 1)?;
     let h_time = start.elapsed();
-    let mut dimensions: Vec<usize> = SHARES.iter().map(|share| least_m(&whole, share * most)).collect();
+    let mut dimensions: Vec<usize> = SHARES
+        .iter()
+        .map(|share| least_m(&whole, share * most))
+        .collect();
     dimensions.dedup();
     let mut best: Option<(usize, Fit)> = None;
     for m in dimensions.into_iter().rev() {

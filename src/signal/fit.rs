@@ -44,7 +44,9 @@ pub struct FitOptions {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FitError {
     /// Too short a sequence.
-    #[error("expected at least {FEWEST_FRAMES} frames, found {found}; a time signal has at least 4 control points")]
+    #[error(
+        "expected at least {FEWEST_FRAMES} frames, found {found}; a time signal has at least 4 control points"
+    )]
     TooFewFrames { found: usize },
     /// k, l or m outside its range.
     #[error("{name} = {value}, expected {low} <= {name} <= {high} for {frames} frames")]
@@ -126,7 +128,11 @@ impl Fit {
     /// k, l and m as used: m is cut to the rank, l to the poses that are apart, k to two more than the distinct parameters.
     pub fn klm(&self) -> (usize, usize, usize) {
         let r = &self.representation;
-        (r.time.spline.control.len(), r.pose.site_count(), r.basis.ncols())
+        (
+            r.time.spline.control.len(),
+            r.pose.site_count(),
+            r.basis.ncols(),
+        )
     }
 }
 
@@ -153,7 +159,11 @@ fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
     if n < FEWEST_FRAMES {
         return Err(FitError::TooFewFrames { found: n });
     }
-    let ranges = [("k", options.k, 4, n + 2), ("l", options.l, 3, n), ("m", options.m, 0, n - 1)];
+    let ranges = [
+        ("k", options.k, 4, n + 2),
+        ("l", options.l, 3, n),
+        ("m", options.m, 0, n - 1),
+    ];
     for (name, value, low, high) in ranges {
         if value < low || value > high {
             return Err(FitError::OutOfRange {
@@ -223,7 +233,12 @@ impl Base {
 
     /// The sites for at most `count` of them.
     pub(super) fn order(&self, count: usize, separation: f64) -> Result<SiteOrder, FactorError> {
-        site_order(&self.positions, self.shape.coordinates.as_ref(), count, separation)
+        site_order(
+            &self.positions,
+            self.shape.coordinates.as_ref(),
+            count,
+            separation,
+        )
     }
 
     pub(super) fn fit(self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {
@@ -242,7 +257,13 @@ impl Base {
         Ok(self.finish(best))
     }
 
-    fn attempt(&self, k: usize, l: usize, rule: KnotRule, separation: f64) -> Result<Attempt, FitError> {
+    fn attempt(
+        &self,
+        k: usize,
+        l: usize,
+        rule: KnotRule,
+        separation: f64,
+    ) -> Result<Attempt, FitError> {
         let (order, g) = timed(|| self.order(l, separation));
         let order = order?;
         let mut attempt = self.signals(k, &order.order, rule)?;
@@ -253,7 +274,12 @@ impl Base {
     }
 
     /// g for these sites and f for k control points, with their errors.
-    pub(super) fn signals(&self, k: usize, sites: &[usize], rule: KnotRule) -> Result<Attempt, FitError> {
+    pub(super) fn signals(
+        &self,
+        k: usize,
+        sites: &[usize],
+        rule: KnotRule,
+    ) -> Result<Attempt, FitError> {
         let x = self.shape.coordinates.as_ref();
         let (pose, rbf) = timed(|| PoseSignal::fit(&self.positions, x, sites));
         let pose = pose?;
@@ -335,11 +361,16 @@ pub(super) fn error_h(frames: MatRef<'_, f64>, shape: &ShapeSignal) -> f64 {
     let d = frames.nrows();
     let frame_error = |i: usize| {
         let mut left: Vec<f64> = (0..d).map(|a| frames[(a, i)] - shape.offset[a]).collect();
-        let x: Vec<f64> = (0..shape.basis.ncols()).map(|j| -shape.coordinates[(j, i)]).collect();
+        let x: Vec<f64> = (0..shape.basis.ncols())
+            .map(|j| -shape.coordinates[(j, i)])
+            .collect();
         crate::linalg::kernels::combine(&x, |j| shape.basis.col_as_slice(j), &mut left);
         crate::linalg::kernels::norm_squared(&left)
     };
-    let each: Vec<f64> = (0..frames.ncols()).into_par_iter().map(frame_error).collect();
+    let each: Vec<f64> = (0..frames.ncols())
+        .into_par_iter()
+        .map(frame_error)
+        .collect();
     each.iter().sum()
 }
 
@@ -375,8 +406,19 @@ mod tests {
     fn interpolating_signals_reproduce_every_frame() {
         let z = frames(12);
         for knots in [KnotRule::Literal, KnotRule::Symmetric] {
-            let fit = fit(z.as_ref(), &FitOptions { knots, ..options(14, 12, 11) }).unwrap();
-            assert!(fit.errors.psi < 1e-18 * z.squared_norm_l2(), "{:?}", fit.errors);
+            let fit = fit(
+                z.as_ref(),
+                &FitOptions {
+                    knots,
+                    ..options(14, 12, 11)
+                },
+            )
+            .unwrap();
+            assert!(
+                fit.errors.psi < 1e-18 * z.squared_norm_l2(),
+                "{:?}",
+                fit.errors
+            );
             assert!(measured(&z, &fit) < 1e-18 * z.squared_norm_l2());
         }
     }
@@ -384,11 +426,22 @@ mod tests {
     #[test]
     fn errors_are_what_the_representation_leaves() {
         let z = frames(20);
-        for (k, l, m) in [(10, 8, 3), (4, 3, 0), (22, 20, 19), (21, 5, 1), (4, 3, 2), (22, 3, 0)] {
+        for (k, l, m) in [
+            (10, 8, 3),
+            (4, 3, 0),
+            (22, 20, 19),
+            (21, 5, 1),
+            (4, 3, 2),
+            (22, 3, 0),
+        ] {
             let fit = fit(z.as_ref(), &options(k, l, m)).unwrap();
             let found = measured(&z, &fit);
             let scale = 1e-10 * z.squared_norm_l2();
-            assert!((found - fit.errors.psi).abs() < scale, "{k} {l} {m}: {found} {:?}", fit.errors);
+            assert!(
+                (found - fit.errors.psi).abs() < scale,
+                "{k} {l} {m}: {found} {:?}",
+                fit.errors
+            );
         }
     }
 
@@ -399,7 +452,11 @@ mod tests {
         let held = Mat::from_fn(30, 24, |a, i| once[(a, i / 2)]);
         for z in [twice, held] {
             let fit = fit(z.as_ref(), &options(26, 24, 23)).unwrap();
-            assert!(fit.errors.psi < 1e-9 * z.squared_norm_l2(), "{:?}", fit.errors);
+            assert!(
+                fit.errors.psi < 1e-9 * z.squared_norm_l2(),
+                "{:?}",
+                fit.errors
+            );
         }
         let still = Mat::from_fn(30, 6, |a, _| a as f64);
         let fit = fit(still.as_ref(), &options(8, 6, 5)).unwrap();
@@ -410,9 +467,19 @@ mod tests {
     #[test]
     fn ranges_are_checked_and_named() {
         let z = frames(8);
-        for (o, name) in [(options(3, 4, 2), "k"), (options(11, 4, 2), "k"), (options(6, 2, 2), "l"), (options(6, 4, 8), "m")] {
-            assert!(matches!(fit(z.as_ref(), &o), Err(FitError::OutOfRange { name: found, .. }) if found == name));
+        for (o, name) in [
+            (options(3, 4, 2), "k"),
+            (options(11, 4, 2), "k"),
+            (options(6, 2, 2), "l"),
+            (options(6, 4, 8), "m"),
+        ] {
+            assert!(
+                matches!(fit(z.as_ref(), &o), Err(FitError::OutOfRange { name: found, .. }) if found == name)
+            );
         }
-        assert_eq!(fit(frames(3).as_ref(), &options(4, 3, 0)).unwrap_err(), FitError::TooFewFrames { found: 3 });
+        assert_eq!(
+            fit(frames(3).as_ref(), &options(4, 3, 0)).unwrap_err(),
+            FitError::TooFewFrames { found: 3 }
+        );
     }
 }

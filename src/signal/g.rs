@@ -35,7 +35,9 @@ pub enum PoseError {
         points: usize,
     },
     /// Two sites at one place, which makes the system singular.
-    #[error("sites {first} and {second} (0-based, of the list of sites) coincide in pose space; keep one of them")]
+    #[error(
+        "sites {first} and {second} (0-based, of the list of sites) coincide in pose space; keep one of them"
+    )]
     Coincident { first: usize, second: usize },
 }
 
@@ -186,7 +188,12 @@ mod tests {
 
     fn points(n: usize) -> Vec<Point> {
         (0..n)
-            .map(|i| [30.0 * (i as f64 * 1.3).sin() + 100.0, 20.0 * (i as f64 * 0.7).cos()])
+            .map(|i| {
+                [
+                    30.0 * (i as f64 * 1.3).sin() + 100.0,
+                    20.0 * (i as f64 * 0.7).cos(),
+                ]
+            })
             .collect()
     }
 
@@ -200,7 +207,11 @@ mod tests {
         let g = PoseSignal::fit(&p, x.as_ref(), &(0..15).collect::<Vec<_>>()).unwrap();
         assert!((g.evaluate(&p) - &x).norm_max() < 1e-9);
         for a in 0..3 {
-            let sum = |f: &dyn Fn(usize) -> f64| (0..15).map(|j| g.coefficients[(a, j + 1)] * f(j)).sum::<f64>();
+            let sum = |f: &dyn Fn(usize) -> f64| {
+                (0..15)
+                    .map(|j| g.coefficients[(a, j + 1)] * f(j))
+                    .sum::<f64>()
+            };
             let size = g.coefficients.norm_max() * 100.0;
             assert!(sum(&|_| 1.0).abs() < 1e-12 * size);
             assert!(sum(&|j| p[j][0]).abs() < 1e-12 * size * 100.0);
@@ -211,7 +222,9 @@ mod tests {
     #[test]
     fn three_sites_give_the_affine_fit() {
         let p = points(10);
-        let x = Mat::from_fn(2, 10, |a, i| 1.0 + p[i][0] * 0.3 - p[i][1] * (a as f64 + 0.1));
+        let x = Mat::from_fn(2, 10, |a, i| {
+            1.0 + p[i][0] * 0.3 - p[i][1] * (a as f64 + 0.1)
+        });
         let g = PoseSignal::fit(&p, x.as_ref(), &[0, 4, 7]).unwrap();
         assert!((g.evaluate(&p) - &x).norm_max() < 1e-11);
     }
@@ -226,8 +239,15 @@ mod tests {
         let mean = (0..6).map(|i| x[(0, i)]).sum::<f64>() / 6.0;
         assert!((one.evaluate(&[[1.0, 1.0]])[(0, 0)] - mean).abs() < 1e-12);
         assert_eq!(
-            PoseSignal::fit(&[[1.0, 1.0], [0.0, 0.0], [1.0, 1.0]], shapes(3).as_ref(), &[0, 1, 2]),
-            Err(PoseError::Coincident { first: 0, second: 2 })
+            PoseSignal::fit(
+                &[[1.0, 1.0], [0.0, 0.0], [1.0, 1.0]],
+                shapes(3).as_ref(),
+                &[0, 1, 2]
+            ),
+            Err(PoseError::Coincident {
+                first: 0,
+                second: 2
+            })
         );
     }
 

@@ -19,7 +19,9 @@ pub enum KnotRule {
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum KnotError {
     /// k outside what the parameters allow.
-    #[error("k = {k} control points, expected 4 <= k <= {most} (two more than the {parameters} distinct parameters)")]
+    #[error(
+        "k = {k} control points, expected 4 <= k <= {most} (two more than the {parameters} distinct parameters)"
+    )]
     OutOfRange {
         k: usize,
         most: usize,
@@ -79,7 +81,11 @@ pub fn knots(parameters: &[f64], k: usize, rule: KnotRule) -> Result<Vec<f64>, K
         (1.0 - a) * parameters[i - 1] + a * parameters[i]
     });
     let (first, last) = (parameters[0], parameters[n - 1]);
-    Ok([first; 3].into_iter().chain(interior).chain([last; 3]).collect())
+    Ok([first; 3]
+        .into_iter()
+        .chain(interior)
+        .chain([last; 3])
+        .collect())
 }
 
 #[cfg(test)]
@@ -91,7 +97,10 @@ mod tests {
     fn the_interpolating_configuration_repeats_the_parameters() {
         let t = [0.0, 1.0, 3.0, 4.5, 5.0];
         for rule in [KnotRule::Literal, KnotRule::Symmetric] {
-            assert_eq!(knots(&t, 7, rule).unwrap(), [0.0, 0.0, 0.0, 1.0, 3.0, 4.5, 5.0, 5.0, 5.0]);
+            assert_eq!(
+                knots(&t, 7, rule).unwrap(),
+                [0.0, 0.0, 0.0, 1.0, 3.0, 4.5, 5.0, 5.0, 5.0]
+            );
             assert_eq!(knots(&t, 4, rule).unwrap(), [0.0, 0.0, 0.0, 5.0, 5.0, 5.0]);
             assert!(knots(&t, 3, rule).is_err() && knots(&t, 8, rule).is_err());
         }

@@ -36,11 +36,14 @@ impl Dissimilarities {
         let n = coordinates.ncols();
         let x = coordinates.to_owned();
         let mut values = vec![0.0; n * n];
-        values.par_chunks_mut(n.max(1)).enumerate().for_each(|(i, row)| {
-            for (j, delta) in row.iter_mut().enumerate() {
-                *delta = separation(x.col_as_slice(i), x.col_as_slice(j));
-            }
-        });
+        values
+            .par_chunks_mut(n.max(1))
+            .enumerate()
+            .for_each(|(i, row)| {
+                for (j, delta) in row.iter_mut().enumerate() {
+                    *delta = separation(x.col_as_slice(i), x.col_as_slice(j));
+                }
+            });
         Self { n, values }
     }
 
@@ -254,7 +257,10 @@ impl Problem {
 }
 
 fn inner(a: &[Point], b: &[Point]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum()
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| a[0] * b[0] + a[1] * b[1])
+        .sum()
 }
 
 fn add_scaled(a: &mut [Point], factor: f64, b: &[Point]) {
@@ -280,7 +286,12 @@ fn majorisation(problem: &Problem, mut layout: Layout) -> (Layout, Slope) {
 }
 
 /// The step of the Newton model inside a disc of this radius, by conjugate gradients (Steihaug 1983), and the decrease it predicts.
-fn newton_step(problem: &Problem, layout: &Layout, gradient: &[Point], radius: f64) -> (Vec<Point>, f64) {
+fn newton_step(
+    problem: &Problem,
+    layout: &Layout,
+    gradient: &[Point],
+    radius: f64,
+) -> (Vec<Point>, f64) {
     let norm = inner(gradient, gradient).sqrt();
     let relative = norm / problem.typical_gradient(layout);
     let target = norm * (10.0 * relative).clamp(1e-4, 0.05);
@@ -348,7 +359,11 @@ fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
         if below_rounding && next_norm >= norm {
             break;
         }
-        let agreement = if below_rounding { 1.0 } else { actual / predicted };
+        let agreement = if below_rounding {
+            1.0
+        } else {
+            actual / predicted
+        };
         let length = inner(&step, &step).sqrt();
         if agreement < 0.25 {
             radius = length / 4.0;
@@ -373,8 +388,7 @@ pub fn scale(delta: &Dissimilarities, start: &[Point], pins: &[Pin]) -> Vec<Poin
         start[pin.frame] = pin.position;
         pinned[pin.frame] = true;
     }
-    let (mut order, fixed): (Vec<usize>, Vec<usize>) =
-        (0..start.len()).partition(|&i| !pinned[i]);
+    let (mut order, fixed): (Vec<usize>, Vec<usize>) = (0..start.len()).partition(|&i| !pinned[i]);
     let free = order.len();
     order.extend(fixed);
     let problem = Problem {
@@ -408,7 +422,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn sample(n: usize) -> Mat<f64> {
-        Mat::from_fn(4, n, |a, i| ((i + 1) as f64 * (a as f64 + 0.4)).sin() / (a + 1) as f64)
+        Mat::from_fn(4, n, |a, i| {
+            ((i + 1) as f64 * (a as f64 + 0.4)).sin() / (a + 1) as f64
+        })
     }
 
     fn start(x: &Mat<f64>) -> Vec<Point> {
@@ -434,8 +450,14 @@ mod tests {
         let x = sample(40);
         let delta = Dissimilarities::new(x.as_ref());
         let pins = [
-            Pin { frame: 3, position: [1.5, 0.2] },
-            Pin { frame: 17, position: [-0.4, -1.0] },
+            Pin {
+                frame: 3,
+                position: [1.5, 0.2],
+            },
+            Pin {
+                frame: 17,
+                position: [-0.4, -1.0],
+            },
         ];
         for pins in [&pins[..0], &pins[..1], &pins] {
             let p = scale(&delta, &start(&x), pins);

@@ -5,7 +5,9 @@ use super::Point;
 /// Centripetal parameters (Lee 1989, exponent 1/2): t_1 = 0, t_{i+1} = t_i + ||p_{i+1} - p_i||^(1/2). Held poses repeat a parameter.
 pub fn centripetal(points: &[Point]) -> Vec<f64> {
     let mut t = 0.0;
-    let steps = points.windows(2).map(|w| super::distance(w[0], w[1]).sqrt());
+    let steps = points
+        .windows(2)
+        .map(|w| super::distance(w[0], w[1]).sqrt());
     let mut parameters = vec![0.0; points.len().min(1)];
     parameters.extend(steps.map(|step| {
         t += step;

@@ -63,7 +63,13 @@ pub fn validate_pins(pins: &[Pin], frames: usize) -> Result<(), PinError> {
 pub fn principal_start(coordinates: MatRef<'_, f64>, pins: &[Pin]) -> Vec<Point> {
     let m = coordinates.nrows();
     let principal = |i: usize| -> Point {
-        std::array::from_fn(|axis| if axis < m { coordinates[(axis, i)] } else { 0.0 })
+        std::array::from_fn(|axis| {
+            if axis < m {
+                coordinates[(axis, i)]
+            } else {
+                0.0
+            }
+        })
     };
     let mut start: Vec<Point> = (0..coordinates.ncols()).map(principal).collect();
     let Some((turn, from, to)) = rigid_motion(&start, pins) else {
@@ -89,7 +95,9 @@ fn rigid_motion(
     let (from, to) = (from * share, to * share);
     let covariance: Matrix2<f64> = pins
         .iter()
-        .map(|p| (Vector2::from(p.position) - to) * (Vector2::from(points[p.frame]) - from).transpose())
+        .map(|p| {
+            (Vector2::from(p.position) - to) * (Vector2::from(points[p.frame]) - from).transpose()
+        })
         .sum();
     if pins.is_empty() {
         return None;
@@ -113,7 +121,10 @@ mod tests {
         let reflected = |i: usize| [3.0 + x[(1, i)], x[(0, i)] + 1.0];
         for motion in [&moved as &dyn Fn(usize) -> Point, &reflected] {
             let pins: Vec<Pin> = [0, 2, 3]
-                .map(|frame| Pin { frame, position: motion(frame) })
+                .map(|frame| Pin {
+                    frame,
+                    position: motion(frame),
+                })
                 .into();
             for (i, p) in principal_start(x.as_ref(), &pins).iter().enumerate() {
                 assert!(super::super::distance(*p, motion(i)) < 1e-12);
@@ -123,13 +134,22 @@ mod tests {
 
     #[test]
     fn contradictions_are_found() {
-        let pin = |frame, x| Pin { frame, position: [x, 0.0] };
+        let pin = |frame, x| Pin {
+            frame,
+            position: [x, 0.0],
+        };
         assert_eq!(validate_pins(&[pin(1, 0.0), pin(1, 0.0)], 4), Ok(()));
         assert!(matches!(
             validate_pins(&[pin(1, 0.0), pin(1, 1.0)], 4),
             Err(PinError::Contradiction { frame: 2, .. })
         ));
-        assert!(matches!(validate_pins(&[pin(4, 0.0)], 4), Err(PinError::NoSuchFrame { .. })));
-        assert!(matches!(validate_pins(&[pin(0, f64::NAN)], 4), Err(PinError::NotFinite { .. })));
+        assert!(matches!(
+            validate_pins(&[pin(4, 0.0)], 4),
+            Err(PinError::NoSuchFrame { .. })
+        ));
+        assert!(matches!(
+            validate_pins(&[pin(0, f64::NAN)], 4),
+            Err(PinError::NotFinite { .. })
+        ));
     }
 }

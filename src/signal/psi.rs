@@ -64,11 +64,15 @@ impl Representation {
 
     /// h(x) into `frame` (d numbers), reading H once. O(d m).
     pub fn shape_into(&self, x: &[f64], frame: &mut [f64]) {
-        frame.par_chunks_mut(BLOCK).with_min_len(4).enumerate().for_each(|(b, block)| {
-            let rows = b * BLOCK..b * BLOCK + block.len();
-            block.copy_from_slice(&self.offset[rows.clone()]);
-            combine(x, |j| &self.basis.col_as_slice(j)[rows.clone()], block);
-        });
+        frame
+            .par_chunks_mut(BLOCK)
+            .with_min_len(4)
+            .enumerate()
+            .for_each(|(b, block)| {
+                let rows = b * BLOCK..b * BLOCK + block.len();
+                block.copy_from_slice(&self.offset[rows.clone()]);
+                combine(x, |j| &self.basis.col_as_slice(j)[rows.clone()], block);
+            });
     }
 
     /// psi(t) into `frame` (d numbers), for a frame time t in [1, n]. O(l m + d m).

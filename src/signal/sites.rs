@@ -93,7 +93,13 @@ impl<'a> Search<'a> {
     /// The open frame with the greatest value; the lowest index of equals, and what is negligible is equal to 0.
     fn farthest(&self, values: &[f64]) -> Option<usize> {
         let negligible = NEGLIGIBLE * self.coordinates.norm_l2();
-        let value = |i: usize| if values[i] <= negligible { 0.0 } else { values[i] };
+        let value = |i: usize| {
+            if values[i] <= negligible {
+                0.0
+            } else {
+                values[i]
+            }
+        };
         (0..values.len())
             .filter(|&i| self.open[i])
             .reduce(|best, i| if value(i) > value(best) { i } else { best })
@@ -116,7 +122,12 @@ impl<'a> Search<'a> {
             self.append(self.points.iter().map(|p| p[axis]).collect());
         }
         self.record();
-        let rest: Vec<usize> = self.order.iter().copied().filter(|s| !self.reference.contains(s)).collect();
+        let rest: Vec<usize> = self
+            .order
+            .iter()
+            .copied()
+            .filter(|s| !self.reference.contains(s))
+            .collect();
         for site in rest {
             self.extend(site);
         }
@@ -147,7 +158,9 @@ impl<'a> Search<'a> {
         let value = |&p: &Point| {
             let mixture = self.reference.iter().zip(&weights);
             between(self.points[site], p)
-                - mixture.map(|(&r, w)| w * between(self.points[r], p)).sum::<f64>()
+                - mixture
+                    .map(|(&r, w)| w * between(self.points[r], p))
+                    .sum::<f64>()
         };
         self.points.iter().map(value).collect()
     }
@@ -222,7 +235,10 @@ fn reference_sites(points: &[Point], sites: &[usize]) -> Vec<usize> {
     };
     for size in [3, 2] {
         let corners = |mask: usize| -> Vec<usize> {
-            let taken = sites.iter().enumerate().filter(|(bit, _)| mask >> bit & 1 == 1);
+            let taken = sites
+                .iter()
+                .enumerate()
+                .filter(|(bit, _)| mask >> bit & 1 == 1);
             taken.map(|(_, &site)| site).collect()
         };
         let best = subsets(size)
@@ -279,11 +295,19 @@ mod tests {
             let g = PoseSignal::fit(&points, x.as_ref(), &found.order[..l]).unwrap();
             let residual = g.evaluate(&points) - &x;
             let error = residual.squared_norm_l2();
-            assert!((error - found.errors[l - 3]).abs() < 1e-10 * x.squared_norm_l2(), "{l}");
+            assert!(
+                (error - found.errors[l - 3]).abs() < 1e-10 * x.squared_norm_l2(),
+                "{l}"
+            );
             if l >= 4 {
                 let next = (0..25)
                     .filter(|i| !found.order[..l].contains(i))
-                    .max_by(|&a, &b| residual.col(a).norm_l2().total_cmp(&residual.col(b).norm_l2()));
+                    .max_by(|&a, &b| {
+                        residual
+                            .col(a)
+                            .norm_l2()
+                            .total_cmp(&residual.col(b).norm_l2())
+                    });
                 assert_eq!(next, Some(found.order[l]));
             }
         }
@@ -309,7 +333,10 @@ mod tests {
     fn degenerate_layouts_still_give_an_order() {
         let x = sample(8).1;
         let line: Vec<Point> = (0..8).map(|i| [i as f64, 0.0]).collect();
-        assert_eq!(site_order(&line, x.as_ref(), 8, 0.0).unwrap().order.len(), 8);
+        assert_eq!(
+            site_order(&line, x.as_ref(), 8, 0.0).unwrap().order.len(),
+            8
+        );
         let one = site_order(&[[2.0, 1.0]; 8], x.as_ref(), 8, 0.0).unwrap();
         assert_eq!(one.order.len(), 1);
         let none = site_order(&line, Mat::zeros(0, 8).as_ref(), 8, 0.0).unwrap();

@@ -43,7 +43,11 @@ impl Frame {
             .map(|p| (p - centre) * (p - centre).transpose())
             .sum();
         let eigen = scatter.symmetric_eigen();
-        let order = if eigen.eigenvalues[0] >= eigen.eigenvalues[1] { [0, 1] } else { [1, 0] };
+        let order = if eigen.eigenvalues[0] >= eigen.eigenvalues[1] {
+            [0, 1]
+        } else {
+            [1, 0]
+        };
         let axes = Matrix2::from_columns(&order.map(|i| eigen.eigenvectors.column(i).into_owned()));
         let extent = |axis: usize| {
             vectors()
