@@ -4,6 +4,7 @@
 //!
 //! | module | what is there |
 //! |---|---|
+//! | [`arrays`] | typed arrays under names |
 //! | [`mesh`] | connectivity, measures (area, volume, bounds), distance to a surface |
 //! | [`linalg`] | what is thin over faer and nalgebra |
 //! | [`sequence`] | deforming sequences, their file formats and the embedded `@name` sequences |
@@ -13,6 +14,7 @@
 //! | [`report`] | plots and the HTML report |
 //! | [`cmd`] | the command line, one file a verb |
 
+pub mod arrays;
 pub mod harness;
 pub mod linalg;
 pub mod mesh;

@@ -1,9 +1,9 @@
 """Raw stress (6) of Cashman & Hormann 2012 brought to a vanishing gradient: SMACOF steps in numpy, then scipy's trust region.
 
-The stress is the sum over pairs i < j of (||p_i - p_j|| - delta_ij)^2, unit weights, no rescaling, and only the free points move (section
-3.2.1, reading 6). The majorisation comes first and keeps the answer in the basin of the start: it stops when the stress falls by less than 1e-9 of itself
-in a step, or after 3000 steps. scipy's trust-exact (More-Sorensen, exact Hessian) leaves any saddle that SMACOF cannot leave, and plain Newton steps by
-LAPACK's gelsd take out the last digits, where the stress itself no longer tells two points apart.
+The stress is the sum over pairs i < j of (||p_i - p_j|| - delta_ij)^2, unit weights, no rescaling, and only the free points move (3.2.1,
+reading 6). The majorisation comes first and keeps the answer in the basin of the start: it stops when the stress falls by less than 1e-9 of
+itself in a step, or after 3000 steps. scipy's trust-exact (More-Sorensen, exact Hessian) then goes to where the Hessian is not negative, off
+the saddles that SMACOF cannot leave. Newton steps by LAPACK's gelsd take out the last digits, where the stress no longer tells points apart.
 """
 
 import numpy as np
@@ -24,13 +24,14 @@ def _ratio(delta, d):
     return np.divide(delta, d, out=np.zeros_like(d), where=d > 0)
 
 
-def _laplacian(weights):
-    return np.diag(weights.sum(axis=1)) - weights
+def _pull(weights, P):
+    """Sum over j of w_ij (p_i - p_j), by differences: coincident points, where w_ij is huge, would lose every digit in a Laplacian."""
+    return np.einsum("ij,ijc->ic", weights, P[:, None] - P[None])
 
 
 def gradient(P, delta):
     """(n, 2): the derivative of the stress at every point, free or not."""
-    return 2 * _laplacian(1 - _ratio(delta, cdist(P, P))) @ P
+    return 2 * _pull(1 - _ratio(delta, cdist(P, P)), P)
 
 
 def hessian(P, delta):
@@ -53,7 +54,7 @@ def majorise(P, delta, free, steps=SMACOF_STEPS, decrease=SMACOF_DECREASE):
         if previous - now <= decrease * now:
             break
         previous = now
-        target = (_laplacian(_ratio(delta, d)) @ P)[free] + P[pinned].sum(axis=0)
+        target = _pull(_ratio(delta, d), P)[free] + P[pinned].sum(axis=0)
         if pinned.any():
             target += target.sum(axis=0) / pinned.sum()
         P = P.copy()
@@ -72,8 +73,8 @@ def _rigid_motions(P, free):
 
 
 def newton(P, delta, free):
-    """Trust-region Newton, then Newton steps for as long as the gradient falls. Lengths are about 1 here."""
-    P, moving, start = P.copy(), np.repeat(free, 2), P
+    """Trust-region Newton, off any saddle, then Newton steps for as long as the gradient falls. Lengths are about 1 here."""
+    P, moving, x = P.copy(), np.repeat(free, 2), P[free].ravel()
 
     def at(x):
         P[free] = x.reshape(-1, 2)
@@ -87,7 +88,12 @@ def newton(P, delta, free):
         return hessian(P, delta)[np.ix_(moving, moving)] + 2 * len(P) * motions @ motions.T
 
     options = {"initial_trust_radius": 0.1, "max_trust_radius": 10.0, "gtol": 1e-9 * len(P), "maxiter": 500}
-    x = minimize(lambda x: stress(at(x), delta), start[free].ravel(), jac=jacobian, hess=curvature, method="trust-exact", options=options).x
+    for _ in range(20):
+        x = minimize(lambda x: stress(at(x), delta), x, jac=jacobian, hess=curvature, method="trust-exact", options=options).x
+        curvatures, directions = np.linalg.eigh(curvature(x))
+        if curvatures[0] > -1e-6 * len(P):
+            break
+        x = x + 1e-2 * directions[:, 0]
     slope = jacobian(x)
     for _ in range(20):
         step = np.linalg.lstsq(curvature(x), slope, rcond=1e-12)[0]
@@ -104,10 +110,10 @@ def newton(P, delta, free):
 
 def _part(P, delta, free):
     """Moves free points that coincide although delta > 0 a little apart: such a point is no minimum, but its Guttman transform may be itself."""
-    stuck = free & ((cdist(P, P) <= 1e-9 * delta) & (delta > 0)).any(axis=1)
+    stuck = free & ((cdist(P, P) == 0) & (delta > 0)).any(axis=1)
     angle = np.arange(len(P))[stuck]
     P = P.copy()
-    P[stuck] += 1e-6 * np.column_stack([np.cos(angle), np.sin(angle)])
+    P[stuck] += 1e-9 * np.column_stack([np.cos(angle), np.sin(angle)])
     return P
 
 

@@ -21,7 +21,10 @@ def shape_signal(Z, m):
 def prepare(stage, inputs):
     if stage != "signal.h":
         raise Unsupported(stage)
-    return lambda: shape_signal(inputs["Z"], inputs["m"])
+    Z, m = inputs["Z"], inputs["m"]
+    if not len(Z) or m < 0:
+        raise Unsupported(f"n = {len(Z)}, m = {m}")
+    return lambda: shape_signal(Z, m)
 
 
 if __name__ == "__main__":

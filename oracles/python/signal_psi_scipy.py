@@ -1,8 +1,9 @@
 """signal.psi: psi = h o g o f at any frame time, equation (1). scipy's CubicHermiteSpline evaluates rho, its BSpline the time signal f
 (section 2.3), its cdist and xlogy the thin-plate pose signal g (section 2.2), and numpy the linear shape signal h (section 2.1).
 
-The slopes of rho are Fritsch & Carlson's (1980) by reading 7: averaged secants, end secants, and one sweep from left to right that
-scales the two slopes of an interval back onto the circle of radius 3 secants. The k+2 knots of the paper get one more copy of each end.
+The slopes of rho are Fritsch & Carlson's (1980) by reading 7: averaged secants, end secants, 0 beside flat intervals, and one sweep from
+left to right that scales the two slopes of an interval back onto the circle of radius 3 secants. The k+2 knots of the paper get one more
+copy of each end.
 """
 
 import math
@@ -23,6 +24,8 @@ from wire import Unsupported, serve
 def monotone_slopes(t):
     secants = np.diff(t)
     slopes = np.concatenate([secants[:1], (secants[:-1] + secants[1:]) / 2, secants[-1:]])
+    flat = np.flatnonzero(secants == 0)
+    slopes[flat] = slopes[flat + 1] = 0.0
     for i, secant in enumerate(secants):
         radius = math.hypot(slopes[i], slopes[i + 1])
         if radius > 3 * secant:

@@ -1,9 +1,9 @@
 """signal.rho: the monotone reparametrisation rho(i) = t_i of section 2.3. scipy's CubicHermiteSpline evaluates it.
 
 The slopes follow Fritsch & Carlson (1980) by reading 7, on unit spacing: secants Delta_i = t_{i+1} - t_i; their averages inside, the
-secants themselves at the ends; then one sweep over the intervals from left to right, each seeing the slopes that the one before left:
-where (alpha, beta) = (d_i, d_{i+1}) / Delta_i lies outside the circle of radius 3, both slopes are scaled back onto it. A slope only
-ever shrinks, so no earlier interval is spoilt. (scipy's PchipInterpolator is Fritsch & Butland's other choice of slopes.)
+secants themselves at the ends; 0 at both ends of a flat interval. Then one sweep from left to right, where an interval sees what the one
+before left: where (alpha, beta) = (d_i, d_{i+1}) / Delta_i lies outside the circle of radius 3, both slopes are scaled back onto it. A
+slope only ever shrinks, so no earlier interval is spoilt. (scipy's PchipInterpolator is Fritsch & Butland's other choice of slopes.)
 """
 
 import math
@@ -19,6 +19,8 @@ from wire import Unsupported, serve
 def monotone_slopes(t):
     secants = np.diff(t)
     slopes = np.concatenate([secants[:1], (secants[:-1] + secants[1:]) / 2, secants[-1:]])
+    flat = np.flatnonzero(secants == 0)
+    slopes[flat] = slopes[flat + 1] = 0.0
     for i, secant in enumerate(secants):
         radius = math.hypot(slopes[i], slopes[i + 1])  # |Delta_i| times the norm of (alpha, beta)
         if radius > 3 * secant:

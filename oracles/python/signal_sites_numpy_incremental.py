@@ -31,12 +31,13 @@ class GrowingFit:
         self.rank = 0
         self.residual = X.copy()
 
-    def append(self, column):
+    def append(self, column, size):
+        """Adds a column that was computed from numbers of this size; one within rounding of the space adds nothing."""
         Q = self.basis[:, : self.rank]
         rest = column - Q @ (Q.T @ column)
         rest -= Q @ (Q.T @ rest)  # the second pass removes what rounding left of the first
         length = np.linalg.norm(rest)
-        if self.rank < len(column) and length > len(column) * np.finfo(float).eps * np.linalg.norm(column):
+        if self.rank < len(column) and length > len(column) * np.finfo(float).eps * size:
             q = rest / length
             self.basis[:, self.rank] = q
             self.rank += 1
@@ -54,7 +55,7 @@ def greedy_order(P, X, count):
 
     fit = GrowingFit(X)
     for column in T.T:
-        fit.append(column)
+        fit.append(column, np.linalg.norm(column))
 
     def error_norms():
         norms = np.linalg.norm(fit.residual, axis=1)
@@ -66,8 +67,9 @@ def greedy_order(P, X, count):
         r2 = np.square(p - p[site]).sum(axis=1)
         Phi[:, l - 1] = 0.5 * r2 * np.log(r2, out=np.zeros_like(r2), where=r2 > 0)
         weights = np.linalg.lstsq(T[order].T, T[site])[0]
-        if np.allclose(weights @ T[order], T[site], rtol=0, atol=1e-12):
-            fit.append(Phi[:, l - 1] - Phi[:, : l - 1] @ weights)
+        spread = 1 + np.abs(weights).sum()
+        if np.linalg.norm(weights @ T[order] - T[site]) < 1e-12 * spread:
+            fit.append(Phi[:, l - 1] - Phi[:, : l - 1] @ weights, spread * np.linalg.norm(Phi[:, l - 1]))
         order.append(site)
         if l >= 4:
             norms = error_norms()

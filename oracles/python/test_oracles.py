@@ -114,6 +114,8 @@ def test_rho(rng):
         close("rho: a line's slopes", line["slopes"], np.full(6, 2.5))
         held = oracle.run(t=np.array([0.0, 1, 1, 2]), query=np.linspace(2, 3, 5))
         close("rho: a held pose's slopes", held["slopes"], [1, 0, 0, 1])
+        stop = oracle.run(t=np.array([0.0, 7, 8, 8, 9]), query=np.ones(1))["slopes"]  # Delta = 7, 1, 0, 1
+        close("rho: a stop's slopes vanish before the others are limited", stop, [7, 3, 0, 0, 1])
         close("rho: a held pose stays", held["values"], np.ones(5))
         limited = oracle.run(t=np.array([0.0, 1, 6, 7]), query=np.array([1.0, 2, 3, 4]))  # Delta = 1, 5, 1
         close("rho: limited to the circle of 3", limited["slopes"], 3 / np.hypot(1, 3) * np.array([1, 3, 3, 1]))
@@ -198,9 +200,12 @@ def test_sites(rng):
             close(f"{program}: an affine map leaves no error", plane["errors"], np.zeros(10), 0)
             line = oracle.run(P=np.outer(np.arange(9.0), [1, 2]), X=rng.normal(size=(9, 3)), count=9)
             check(f"{program}: collinear poses interpolate", line["errors"][-1] == 0)
-            twice = np.tile(P[:8], (2, 1))
-            double = oracle.run(P=twice, X=np.tile(X[:8], (2, 1)), count=16)
-            check(f"{program}: coincident poses end at 0", double["errors"][-1] == 0 and sorted(double["order"]) == list(range(16)))
+            double = oracle.run(P=np.tile(P[:8], (2, 1)), X=X[:16], count=16)
+            between = np.square(X[:8] - X[8:16]).sum() / 2
+            close(f"{program}: coincident poses leave half their squared distance", double["errors"][-1], between, 1e-9)
+            locations = [len(set(double["order"][:l] % 8)) for l in range(3, 17)]
+            still = np.diff(locations) == 0
+            close(f"{program}: a coincident site changes nothing", np.diff(double["errors"])[still], np.zeros(still.sum()), 1e-9)
             check(f"{program}: count = 3", oracle.status(P=P, X=X, count=3) == "unsupported")
     close("sites: both orders", answers[0]["order"], answers[1]["order"], 0)
     close("sites: both errors", answers[0]["errors"], answers[1]["errors"], 1e-9)
@@ -254,6 +259,9 @@ def test_psi():
         tau = np.linspace(1, 4, 13)
         given = dict(h0=h0, H=H, sites=sites, control=ramp, u=np.array([0.0, 0, 0, 3, 3, 3]), t=np.arange(4.0), tau=tau)
         close("psi: a straight motion", oracle.run(g=g, **given)["Z"], h0 + np.outer(tau - 1, [1, 0, 0]))
+        steep = oracle.run(g=g, **(given | {"t": np.array([0.0, 0.1, 2.9, 3]), "tau": np.array([1.5])}))["Z"]
+        ends = 0.3 / np.hypot(0.1, 1.45) * np.array([0.1, 1.45])  # slopes limited to three secants of 0.1
+        close("psi: rho is limited", steep, [h0 + [(0.1 + (ends[0] - ends[1]) / 4) / 2, 0, 0]])
         g[1:5, 1] = [1, -1, -1, 1]  # the side conditions hold: a square's saddle
         found = oracle.run(g=g, **given)["Z"]
         p = np.column_stack([tau - 1, np.zeros(13)])

@@ -87,9 +87,9 @@ def _run(prepare, request):
 
 
 def _answer(version, prepare, request):
-    if request["op"] == "version":
-        return {"status": "ok", "version": version}
     try:
+        if request["op"] == "version":
+            return {"status": "ok", "version": version}
         return _run(prepare, request)
     except Unsupported as reason:
         return {"status": "unsupported", "message": str(reason)}

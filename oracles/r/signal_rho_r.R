@@ -1,13 +1,12 @@
 # Stage signal.rho by stats::splinefun(method = "monoH.FC"), R's reading of Fritsch & Carlson 1980.
 #
 # R's preliminary slopes are those of reading 7: the secants at the ends, their averages inside. Its limiter is not.
-# - R limits a pair (alpha, beta) only outside the whole region M of Fritsch & Carlson, which is larger than the circle of
-#   radius 3, and then brings it onto that circle. Reading 7 limits every pair outside the circle.
-# - R goes once from left to right and sets the slopes beside a zero secant when it meets it; Fritsch & Carlson set those to
-#   zero first.
+# - R limits a pair (alpha, beta) only outside the whole region M of monotone pairs, which is larger than the circle of radius
+#   3, and then brings it onto that circle. Reading 7 limits every pair outside the circle.
+# - R goes once from left to right and sets the slopes beside a zero secant when it meets it; `circle_slopes` sets those first.
 # M is not closed under shrinking one of the two, so R's answer is not always monotone (r-help, February 2010: "Non-monotonic
-# spline using splinefun"). The two agree where no pair leaves the circle, or where every pair that does leaves M as well.
-# `circle_slopes` is reading 7, and where R's slopes are others, R has not got the stage.
+# spline using splinefun"). `circle_slopes` is reading 7, and where R's slopes are others, R has not got the stage: an "ok" says
+# that both limiters give the same slopes, and the values are splinefun's own.
 
 source(file.path(dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE))), "wire.R"))
 

@@ -31,7 +31,8 @@ pub struct Pca {
 ///
 /// The Gram matrix of the centred samples is formed block by block (n^2 d flops, no d x n temporary) and its eigenvectors give the basis. Where the
 /// kept singular values spread too far for that, the singular values come from a Householder QR of the data, which costs four times as much and
-/// a copy of the data, and has the accuracy of an SVD. Rank counts singular values above max(n, d) eps times the largest.
+/// a copy of the data, and has the accuracy of an SVD. Rank counts singular values above max(n, d) eps ||samples||_F: rounding in the centred
+/// samples is relative to the samples.
 pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     let (d, n) = samples.shape();
     let m = m.min(n.saturating_sub(1)).min(d);
@@ -39,12 +40,19 @@ pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     if m == 0 {
         return Ok(empty(mean, d, n));
     }
+    let negligible = n.max(d) as f64 * f64::EPSILON * frobenius(samples);
     if n < d
-        && let Some(pca) = by_gram(samples, &mean, m)?
+        && let Some(pca) = by_gram(samples, &mean, m, negligible)?
     {
         return Ok(pca);
     }
-    by_qr(samples, mean, m)
+    by_qr(samples, mean, m, negligible)
+}
+
+fn frobenius(samples: MatRef<'_, f64>) -> f64 {
+    let square = |j| samples.col(j).iter().map(|x| x * x).sum::<f64>();
+    let squares: Vec<f64> = (0..samples.ncols()).into_par_iter().map(square).collect();
+    squares.iter().sum::<f64>().sqrt()
 }
 
 fn empty(mean: Vec<f64>, d: usize, n: usize) -> Pca {
@@ -121,10 +129,16 @@ fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
 }
 
 /// The Gram route, or None where the kept singular values spread too far for it.
-fn by_gram(samples: MatRef<'_, f64>, mean: &[f64], m: usize) -> Result<Option<Pca>, FactorError> {
+fn by_gram(
+    samples: MatRef<'_, f64>,
+    mean: &[f64],
+    m: usize,
+    negligible: f64,
+) -> Result<Option<Pca>, FactorError> {
     let n = samples.ncols();
     let eigen = symmetric_eigen(gram(samples, mean).as_ref())?;
-    if eigen.values[m - 1] <= GRAM_LIMIT * eigen.values[0] {
+    let least = (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible);
+    if eigen.values[m - 1] <= least {
         return Ok(None);
     }
     let sigma: Vec<f64> = eigen.values.iter().map(|v| v.max(0.0).sqrt()).collect();
@@ -160,7 +174,12 @@ fn centred_product(samples: MatRef<'_, f64>, mean: &[f64], w: MatRef<'_, f64>) -
 }
 
 /// The Householder route: Y = Q R and R = U S V^T give Y = (Q U) S V^T.
-fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, FactorError> {
+fn by_qr(
+    samples: MatRef<'_, f64>,
+    mean: Vec<f64>,
+    m: usize,
+    negligible: f64,
+) -> Result<Pca, FactorError> {
     let (d, n) = samples.shape();
     let mut centred = Mat::zeros(d, n);
     centred_rows(samples, &mean, 0, centred.as_mut());
@@ -176,8 +195,7 @@ fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, Fact
         let svd = thin_svd(centred.as_ref())?;
         (svd.u, svd.v, svd.s)
     };
-    let limit = n.max(d) as f64 * f64::EPSILON * s.first().copied().unwrap_or(0.0);
-    let m = m.min(s.iter().take_while(|&&s| s > limit).count());
+    let m = m.min(s.iter().take_while(|&&s| s > negligible).count());
     let mut basis = u.get(.., ..m).to_owned();
     let signs = orient(&mut basis);
     Ok(Pca {
@@ -223,8 +241,8 @@ mod tests {
         let whole = pca(samples.as_ref(), 8).unwrap();
         assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
         let mean = mean(samples.as_ref());
-        let gram = by_gram(samples.as_ref(), &mean, 4).unwrap().unwrap();
-        let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
+        let gram = by_gram(samples.as_ref(), &mean, 4, 0.0).unwrap().unwrap();
+        let qr = by_qr(samples.as_ref(), mean, 4, 0.0).unwrap();
         assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);
         assert!((&gram.coordinates - &qr.coordinates).norm_max() < 1e-12 * samples.norm_l2());
     }
@@ -242,7 +260,7 @@ mod tests {
 
     #[test]
     fn repeated_samples_cut_the_rank() {
-        let samples = Mat::from_fn(50, 6, |i, j| ((i * (j % 3 + 1)) as f64).sin());
+        let samples = Mat::from_fn(50, 6, |i, j| 1e3 + ((i * (j % 3 + 1)) as f64).sin());
         assert_eq!(pca(samples.as_ref(), 5).unwrap().basis.ncols(), 2);
         assert_eq!(pca(samples.as_ref(), 0).unwrap().basis.ncols(), 0);
     }

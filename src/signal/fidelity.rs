@@ -90,7 +90,7 @@ fn least_l_and_k(
     most: f64,
     rule: KnotRule,
 ) -> Result<Option<Attempt>, FitError> {
-    let order = base.order(usize::MAX, 0.0)?;
+    let order = base.order(usize::MAX)?;
     let mut best: Option<(usize, Attempt)> = None;
     let mut tried = 0;
     for share in SHARES {

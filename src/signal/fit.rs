@@ -14,16 +14,21 @@ use super::knots::{KnotError, KnotRule, knots};
 use super::mds::{Dissimilarities, scale};
 use super::parameters::{centripetal, distinct};
 use super::pins::{Pin, PinError, principal_start, validate_pins};
+use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
 use super::sites::{SiteOrder, site_order};
 use crate::linalg::dense::FactorError;
 
 /// Fewest frames that a time signal of four control points can follow.
 pub const FEWEST_FRAMES: usize = 4;
-/// Where (2) exceeds this many times (3) + (4), some sites are nearly coincident and are merged (reading 10).
+/// Frames closer than this share of the layout's diameter are one pose, whose first frame is its candidate site (reading 10).
+const SAME_POSE: f64 = 1e-4;
+/// Where (2) exceeds this many times (3) + (4), sites are so close that g swings between them.
 const UNSTABLE: f64 = 8.0;
-/// Separations tried then, as shares of the poses' extent.
-const SEPARATIONS: [f64; 9] = [0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2];
+/// Wider poses tried then, as shares of the diameter.
+const WIDER_POSES: [f64; 9] = [1e-4, 1e-3, 0.005, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15];
+/// A step of less than this share of the diameter is no step: the square root of the centripetal rule would make 1e-16 of rounding 1e-8.
+const HELD: f64 = 1e-9;
 
 /// What to fit with. Ranges: 4 <= k <= n + 2, 3 <= l <= n, 0 <= m <= n - 1 (section 3.4).
 #[derive(Clone, Debug, PartialEq)]
@@ -118,8 +123,8 @@ pub struct Fit {
     pub singular_values: Vec<f64>,
     /// Frames that became sites, 0-based, in order, with the error (4) of every l.
     pub sites: SiteOrder,
-    /// Frames nearer than this to a site in pose space were merged with it; 0 where nothing had to be.
-    pub separation: f64,
+    /// Frames within this distance in pose space count as one pose; see [`fit`].
+    pub same_pose: f64,
     pub errors: Errors,
     pub timings: Timings,
 }
@@ -145,9 +150,9 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 
 /// Fits the representation to `frames` (d x n): h, then p by scaling, then g, then f, with (2) to (7) measured at the end.
 ///
-/// Repeated and nearly repeated poses follow two rules (reading 10). Frames at one pose-space position make one site. And where (2) exceeds
-/// [`UNSTABLE`] times (3) + (4) - the mark of nearly coincident sites, between which g swings - sites nearer than a separation are merged, the one
-/// of a fixed ladder of separations (shares of the poses' extent) that makes (2) least.
+/// Repeated and nearly repeated poses (reading 10). Frames within 1e-4 of the layout's diameter are one pose; the first frame of each pose is a
+/// candidate site, and the others come after all candidates, so that l = n still interpolates. Where (2) then still exceeds 8 times (3) + (4), the
+/// mark of sites so close that g swings between them, wider poses are tried, with one site each, on a fixed ladder, and the least (2) is kept.
 pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitError> {
     check_ranges(frames.ncols(), options)?;
     validate_pins(&options.pins, frames.ncols())?;
@@ -182,8 +187,11 @@ fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
 pub(super) struct Base {
     shape: ShapeSignal,
     positions: Vec<Point>,
+    diameter: f64,
     parameters: Vec<f64>,
     error_h: f64,
+    /// An error (2) that is rounding.
+    negligible: f64,
     timings: Timings,
 }
 
@@ -202,8 +210,11 @@ impl Base {
             let delta = Dissimilarities::new(x);
             scale(&delta, &principal_start(x, pins), pins)
         });
+        let diameter = diameter(&positions);
         Self {
-            parameters: frame_parameters(&positions),
+            parameters: frame_parameters(&positions, diameter),
+            diameter,
+            negligible: 1e-12 * shape.coordinates.squared_norm_l2(),
             shape,
             positions,
             error_h,
@@ -225,30 +236,33 @@ impl Base {
         distinct(&self.parameters).len() + 2
     }
 
-    /// Extent of the poses: the greatest distance from the first.
-    fn extent(&self) -> f64 {
-        let reach = |p: &Point| super::distance(*p, self.positions[0]);
-        self.positions.iter().map(reach).fold(0.0, f64::max)
+    /// At most `count` sites, the first frames of poses before the others.
+    pub(super) fn order(&self, count: usize) -> Result<SiteOrder, FactorError> {
+        let candidates = first_of_each(&self.positions, SAME_POSE * self.diameter);
+        self.order_among(count, &candidates)
     }
 
-    /// The sites for at most `count` of them.
-    pub(super) fn order(&self, count: usize, separation: f64) -> Result<SiteOrder, FactorError> {
-        site_order(
-            &self.positions,
-            self.shape.coordinates.as_ref(),
-            count,
-            separation,
-        )
+    /// At most `count` sites, one a pose.
+    fn order_of_poses(&self, count: usize, same_pose: f64) -> Result<SiteOrder, FactorError> {
+        let candidates = first_of_each(&self.positions, same_pose);
+        let poses = candidates.iter().filter(|&&first| first).count();
+        self.order_among(count.min(poses), &candidates)
+    }
+
+    fn order_among(&self, count: usize, candidates: &[bool]) -> Result<SiteOrder, FactorError> {
+        let x = self.shape.coordinates.as_ref();
+        site_order(&self.positions, x, count, candidates)
     }
 
     pub(super) fn fit(self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {
-        let first = self.attempt(k, l, rule, 0.0)?;
-        let settled = |a: &Attempt| a.errors.psi <= UNSTABLE * (a.errors.h + a.errors.g);
-        let mut best = first;
-        if !settled(&best) {
-            let extent = self.extent();
-            for share in SEPARATIONS {
-                let next = self.attempt(k, l, rule, share * extent)?;
+        let mut best = self.attempt(k, rule, SAME_POSE * self.diameter, || self.order(l))?;
+        if best.errors.psi > UNSTABLE * (best.errors.h + best.errors.g)
+            && best.errors.psi > self.negligible
+        {
+            for share in WIDER_POSES {
+                let same_pose = share * self.diameter;
+                let next =
+                    self.attempt(k, rule, same_pose, || self.order_of_poses(l, same_pose))?;
                 if next.errors.psi < best.errors.psi {
                     best = next;
                 }
@@ -260,16 +274,16 @@ impl Base {
     fn attempt(
         &self,
         k: usize,
-        l: usize,
         rule: KnotRule,
-        separation: f64,
+        same_pose: f64,
+        order: impl FnOnce() -> Result<SiteOrder, FactorError>,
     ) -> Result<Attempt, FitError> {
-        let (order, g) = timed(|| self.order(l, separation));
+        let (order, g) = timed(order);
         let order = order?;
         let mut attempt = self.signals(k, &order.order, rule)?;
         attempt.timings.g = g;
         attempt.sites = order;
-        attempt.separation = separation;
+        attempt.same_pose = same_pose;
         Ok(attempt)
     }
 
@@ -302,7 +316,7 @@ impl Base {
                 order: Vec::new(),
                 errors: Vec::new(),
             },
-            separation: 0.0,
+            same_pose: SAME_POSE * self.diameter,
             timings: Timings {
                 rbf,
                 f,
@@ -329,7 +343,7 @@ impl Base {
             coordinates: self.shape.coordinates,
             singular_values: self.shape.singular_values,
             sites: attempt.sites,
-            separation: attempt.separation,
+            same_pose: attempt.same_pose,
             errors: attempt.errors,
             timings: attempt.timings,
         }
@@ -342,13 +356,20 @@ pub(super) struct Attempt {
     spline: Spline,
     pub(super) errors: Errors,
     pub(super) sites: SiteOrder,
-    separation: f64,
+    same_pose: f64,
     timings: Timings,
 }
 
-/// Centripetal parameters; where all poses coincide every parameter would be 0, and the frame number serves instead.
-fn frame_parameters(positions: &[Point]) -> Vec<f64> {
-    let t = centripetal(positions);
+/// Centripetal parameters of positions whose held poses stand still exactly; where all poses coincide every parameter would be 0, and the
+/// frame number serves instead.
+fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
+    let mut still = positions.to_vec();
+    for i in 1..still.len() {
+        if super::distance(still[i], still[i - 1]) <= HELD * diameter {
+            still[i] = still[i - 1];
+        }
+    }
+    let t = centripetal(&still);
     if distinct(&t).len() > 1 {
         t
     } else {

@@ -4,11 +4,12 @@
 //! | paper | here |
 //! |---|---|
 //! | 2.1, 3.1 shape signal h | [`h`] |
-//! | 3.2.1 pose-space positions | [`mds`] |
+//! | 3.2.1 pose-space positions, pins | [`mds`], [`pins`] |
 //! | 2.2, 3.2 pose signal g | [`g`] |
 //! | 3.2.2 site order | [`sites`] |
 //! | 2.3, 3.3 time signal f: parameters, knots, spline, rho | [`parameters`], [`knots`], [`f`], [`rho`] |
 //! | 2.4 the chain psi | [`psi`] |
+//! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
 //!
@@ -24,6 +25,7 @@ pub mod knots;
 pub mod mds;
 pub mod parameters;
 pub mod pins;
+pub mod poses;
 pub mod psi;
 pub mod rho;
 pub mod sites;

@@ -1,7 +1,7 @@
 //! The monotone reparametrisation rho from frame numbers to spline parameters (section 2.3).
 
 /// The monotone cubic of Fritsch & Carlson 1980 through rho(i) = t_i at frames i = 1 .. n (reading 7: averaged secants inside, secant slopes at the
-/// ends, the circle of radius 3 as limiter).
+/// ends, the circle of radius 3 as limiter, swept from the first interval to the last after the slopes beside flat intervals are set to 0).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rho {
     values: Vec<f64>,
@@ -48,11 +48,10 @@ fn limited_slopes(secants: &[f64], n: usize) -> Vec<f64> {
     let mut slopes = vec![first];
     slopes.extend(secants.windows(2).map(|w| (w[0] + w[1]) / 2.0));
     slopes.push(last);
-    for (i, &secant) in secants.iter().enumerate() {
-        if secant == 0.0 {
-            (slopes[i], slopes[i + 1]) = (0.0, 0.0);
-            continue;
-        }
+    for i in (0..secants.len()).filter(|&i| secants[i] == 0.0) {
+        (slopes[i], slopes[i + 1]) = (0.0, 0.0);
+    }
+    for (i, &secant) in secants.iter().enumerate().filter(|(_, s)| **s != 0.0) {
         let length = (slopes[i] / secant).hypot(slopes[i + 1] / secant);
         if length > 3.0 {
             slopes[i] *= 3.0 / length;

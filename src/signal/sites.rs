@@ -27,8 +27,8 @@ pub struct SiteOrder {
 /// Chooses `count` sites: the four frames farthest from the best-fit plane, then again and again the frame with the greatest error of the fit with
 /// the sites so far.
 ///
-/// `points` are the n pose-space positions and `coordinates` (m x n) the shape coordinates. A frame nearer than `separation` (in the units of the
-/// points) to a chosen site, or at the same place, is passed over (reading 10). Ties go to the lower index (reading 5).
+/// `points` are the n pose-space positions and `coordinates` (m x n) the shape coordinates. Frames that are no `candidates` wait until all
+/// candidates are chosen (reading 10); a frame at the same place as a chosen site is never chosen. Ties go to the lower index (reading 5).
 ///
 /// The fits are one QR that grows by a column a site: the spaces are nested once the side conditions are met by subtracting, from each site's
 /// kernel, the kernels of three fixed sites with the site's barycentric weights. O(n^2) kernels, then O(n (l + m)) a site.
@@ -36,9 +36,9 @@ pub fn site_order(
     points: &[Point],
     coordinates: MatRef<'_, f64>,
     count: usize,
-    separation: f64,
+    candidates: &[bool],
 ) -> Result<SiteOrder, FactorError> {
-    let mut search = Search::new(points, coordinates, separation);
+    let mut search = Search::new(points, coordinates, candidates);
     let distances = plane_distances(coordinates)?;
     for _ in 0..count.min(4) {
         let Some(next) = search.farthest(&distances) else {
@@ -65,9 +65,9 @@ struct Search<'a> {
     /// Normalised positions.
     points: Vec<Point>,
     order: Vec<usize>,
-    /// Frames that may still become sites.
+    /// Frames that may still become sites, the candidates before the others.
     open: Vec<bool>,
-    separation: f64,
+    candidates: &'a [bool],
     /// Up to three sites that span the plane, by which the others meet the side conditions.
     reference: Vec<usize>,
     fit: AppendedQr,
@@ -76,13 +76,13 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(points: &[Point], coordinates: MatRef<'a, f64>, separation: f64) -> Self {
+    fn new(points: &[Point], coordinates: MatRef<'a, f64>, candidates: &'a [bool]) -> Self {
         let frame = Frame::new(points);
         Self {
             points: points.iter().map(|&p| frame.normalise(p)).collect(),
             order: Vec::new(),
             open: vec![true; points.len()],
-            separation: (separation / frame.size).max(COINCIDENT),
+            candidates,
             reference: Vec::new(),
             fit: AppendedQr::new(coordinates.transpose()),
             residual_squares: Vec::new(),
@@ -90,7 +90,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The open frame with the greatest value; the lowest index of equals, and what is negligible is equal to 0.
+    /// The open frame with the greatest value, a candidate if there is one; the lowest index of equals, and what is negligible is equal to 0.
     fn farthest(&self, values: &[f64]) -> Option<usize> {
         let negligible = NEGLIGIBLE * self.coordinates.norm_l2();
         let value = |i: usize| {
@@ -100,15 +100,18 @@ impl<'a> Search<'a> {
                 values[i]
             }
         };
-        (0..values.len())
-            .filter(|&i| self.open[i])
-            .reduce(|best, i| if value(i) > value(best) { i } else { best })
+        let worst = |candidate: bool| {
+            (0..values.len())
+                .filter(|&i| self.open[i] && self.candidates[i] == candidate)
+                .reduce(|best, i| if value(i) > value(best) { i } else { best })
+        };
+        worst(true).or_else(|| worst(false))
     }
 
     fn choose(&mut self, site: usize) {
         self.order.push(site);
         for i in 0..self.points.len() {
-            if super::distance(self.points[i], self.points[site]) <= self.separation {
+            if super::distance(self.points[i], self.points[site]) <= COINCIDENT {
                 self.open[i] = false;
             }
         }
@@ -289,7 +292,7 @@ mod tests {
     #[test]
     fn errors_are_those_of_fresh_fits_and_the_choice_is_the_worst_frame() {
         let (points, x) = sample(25);
-        let found = site_order(&points, x.as_ref(), 25, 0.0).unwrap();
+        let found = site_order(&points, x.as_ref(), 25, &[true; 25]).unwrap();
         assert_eq!(found.order.len(), 25);
         for l in 3..25 {
             let g = PoseSignal::fit(&points, x.as_ref(), &found.order[..l]).unwrap();
@@ -324,9 +327,18 @@ mod tests {
                 x[(a, i)] = x[(a, i - 10)];
             }
         }
-        let found = site_order(&points, x.as_ref(), 20, 0.0).unwrap();
+        let found = site_order(&points, x.as_ref(), 20, &[true; 20]).unwrap();
         assert_eq!(found.order.len(), 10);
         assert!(found.order.iter().all(|&i| i < 10));
+    }
+
+    #[test]
+    fn candidates_come_first_and_the_others_after_them() {
+        let (points, x) = sample(12);
+        let candidates: Vec<bool> = (0..12).map(|i| i % 3 != 0).collect();
+        let found = site_order(&points, x.as_ref(), 12, &candidates).unwrap();
+        assert!(found.order[..8].iter().all(|i| i % 3 != 0));
+        assert!(found.order[8..].iter().all(|i| i % 3 == 0));
     }
 
     #[test]
@@ -334,12 +346,15 @@ mod tests {
         let x = sample(8).1;
         let line: Vec<Point> = (0..8).map(|i| [i as f64, 0.0]).collect();
         assert_eq!(
-            site_order(&line, x.as_ref(), 8, 0.0).unwrap().order.len(),
+            site_order(&line, x.as_ref(), 8, &[true; 8])
+                .unwrap()
+                .order
+                .len(),
             8
         );
-        let one = site_order(&[[2.0, 1.0]; 8], x.as_ref(), 8, 0.0).unwrap();
+        let one = site_order(&[[2.0, 1.0]; 8], x.as_ref(), 8, &[true; 8]).unwrap();
         assert_eq!(one.order.len(), 1);
-        let none = site_order(&line, Mat::zeros(0, 8).as_ref(), 8, 0.0).unwrap();
+        let none = site_order(&line, Mat::zeros(0, 8).as_ref(), 8, &[true; 8]).unwrap();
         assert_eq!(none.order, [0, 1, 2, 3, 4, 5, 6, 7]);
     }
 }

@@ -1,0 +1,86 @@
+//! The algorithms as named stages: plain arrays in, plain arrays out. `oracles/PROTOCOL.md` gives every stage's arrays.
+
+pub mod sequence;
+pub mod signal;
+
+use thiserror::Error;
+
+use crate::arrays::{ArrayError, Bundle};
+
+/// One step of an algorithm.
+pub struct Stage {
+    /// Such as `signal.mds`.
+    pub name: &'static str,
+    /// What it does and where the paper says so.
+    pub about: &'static str,
+    /// Reads the inputs; the call that comes back is the stage's own work.
+    pub prepare: fn(&Bundle) -> Result<Box<dyn Call>, StageError>,
+}
+
+/// The work of a stage on inputs already in their natural layout. `run` may be timed; `outputs` is not.
+pub trait Call {
+    /// Does the work once and keeps its result.
+    fn run(&mut self) -> Result<(), StageError>;
+    /// The last result as arrays.
+    fn outputs(&self) -> Bundle;
+}
+
+/// Why a stage gave nothing.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum StageError {
+    /// The inputs lack an array or have another kind of it.
+    #[error(transparent)]
+    Arrays(#[from] ArrayError),
+    /// The algorithm refused.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl StageError {
+    fn from_error(error: impl std::error::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Every stage, by system and in the order of the paper.
+pub fn all() -> impl Iterator<Item = &'static Stage> {
+    sequence::STAGES.iter().chain(signal::STAGES)
+}
+
+/// The stage of this name.
+pub fn find(name: &str) -> Option<&'static Stage> {
+    all().find(|stage| stage.name == name)
+}
+
+/// A call made of a function that works and a function that turns its result into arrays.
+struct Work<T, W, O> {
+    work: W,
+    arrays: O,
+    result: Option<T>,
+}
+
+impl<T, W, O> Call for Work<T, W, O>
+where
+    W: FnMut() -> Result<T, StageError>,
+    O: Fn(&T) -> Bundle,
+{
+    fn run(&mut self) -> Result<(), StageError> {
+        self.result = Some((self.work)()?);
+        Ok(())
+    }
+
+    fn outputs(&self) -> Bundle {
+        self.result.as_ref().map(&self.arrays).unwrap_or_default()
+    }
+}
+
+fn call<T: 'static>(
+    work: impl FnMut() -> Result<T, StageError> + 'static,
+    arrays: impl Fn(&T) -> Bundle + 'static,
+) -> Result<Box<dyn Call>, StageError> {
+    Ok(Box::new(Work {
+        work,
+        arrays,
+        result: None,
+    }))
+}

@@ -1,0 +1,433 @@
+//! The stages of Cashman & Hormann 2012.
+
+use faer::{Mat, MatRef};
+
+use super::{Call, Stage, StageError, call};
+use crate::arrays::{Array, Bundle};
+use crate::signal::f::Spline;
+use crate::signal::fit::{FitOptions, fit};
+use crate::signal::g::PoseSignal;
+use crate::signal::h::shape_signal;
+use crate::signal::knots::{KnotRule, knots};
+use crate::signal::mds::{Dissimilarities, scale};
+use crate::signal::parameters::centripetal;
+use crate::signal::pins::{Pin, validate_pins};
+use crate::signal::psi::{Representation, TimeSignal};
+use crate::signal::rho::Rho;
+use crate::signal::sites::site_order;
+
+/// In the order of the paper.
+pub static STAGES: &[Stage] = &[
+    Stage {
+        name: "signal.h",
+        about: "shape signal: mean, basis, coordinates (section 3.1, error (3))",
+        prepare: h,
+    },
+    Stage {
+        name: "signal.mds",
+        about: "pose-space positions by scaling (section 3.2.1, stress (6))",
+        prepare: mds,
+    },
+    Stage {
+        name: "signal.mds_fixed",
+        about: "pose-space positions with some of them fixed (section 3.2.1)",
+        prepare: mds_fixed,
+    },
+    Stage {
+        name: "signal.rbf",
+        about: "pose signal: thin-plate least squares with side conditions (sections 2.2, 3.2)",
+        prepare: rbf,
+    },
+    Stage {
+        name: "signal.sites",
+        about: "greedy order of the sites (section 3.2.2, error (4))",
+        prepare: sites,
+    },
+    Stage {
+        name: "signal.parameters",
+        about: "centripetal parameters (section 3.3)",
+        prepare: parameters,
+    },
+    Stage {
+        name: "signal.knots",
+        about: "knots of the time signal (section 3.3)",
+        prepare: knot_vector,
+    },
+    Stage {
+        name: "signal.spline",
+        about: "time signal: least-squares cubic spline (sections 2.3, 3.3, error (7))",
+        prepare: spline,
+    },
+    Stage {
+        name: "signal.rho",
+        about: "monotone reparametrisation (section 2.3, Fritsch & Carlson 1980)",
+        prepare: rho,
+    },
+    Stage {
+        name: "signal.psi",
+        about: "the representation at any times (equation (1))",
+        prepare: psi,
+    },
+    Stage {
+        name: "signal",
+        about: "the whole reconstruction (section 3, error (2))",
+        prepare: pipeline,
+    },
+];
+
+fn h(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let frames = inputs.matrix("Z")?;
+    let m = inputs.integer("m")?;
+    call(
+        move || shape_signal(frames.as_ref(), m).map_err(StageError::from_error),
+        |shape| {
+            let m = shape.basis.ncols();
+            Bundle::from([
+                ("h0", Array::vector(&shape.offset)),
+                ("H", Array::columns(shape.basis.as_ref())),
+                ("X", Array::columns(shape.coordinates.as_ref())),
+                ("sigma", Array::vector(&shape.singular_values[..m])),
+            ])
+        },
+    )
+}
+
+/// Forming the dissimilarities is part of the work.
+fn mds(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    scaling(inputs, Vec::new())
+}
+
+fn mds_fixed(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let positions = inputs.points("positions")?;
+    let fixed = inputs.indices("fixed")?.into_iter();
+    let pins: Vec<Pin> = fixed
+        .zip(positions)
+        .map(|(frame, position)| Pin { frame, position })
+        .collect();
+    scaling(inputs, pins)
+}
+
+fn scaling(inputs: &Bundle, pins: Vec<Pin>) -> Result<Box<dyn Call>, StageError> {
+    let x = inputs.matrix("X")?;
+    let start = inputs.points("start")?;
+    same_count("start", start.len(), x.ncols())?;
+    validate_pins(&pins, x.ncols()).map_err(StageError::from_error)?;
+    call(
+        move || Ok(scale(&Dissimilarities::new(x.as_ref()), &start, &pins)),
+        |positions| Bundle::from([("P", Array::points(positions))]),
+    )
+}
+
+fn same_count(name: &str, found: usize, expected: usize) -> Result<(), StageError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(StageError::Failed(format!(
+        "`{name}` has {found} rows, expected {expected}, one a frame"
+    )))
+}
+
+fn rbf(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let points = inputs.points("P")?;
+    let x = inputs.matrix("X")?;
+    let sites = inputs.indices("sites")?;
+    let query = inputs.points("query")?;
+    same_count("P", points.len(), x.ncols())?;
+    let frames = points.clone();
+    call(
+        move || PoseSignal::fit(&points, x.as_ref(), &sites).map_err(StageError::from_error),
+        move |pose| {
+            Bundle::from([
+                ("g", Array::columns(pose.coefficients.as_ref())),
+                ("values", Array::columns(pose.evaluate(&frames).as_ref())),
+                ("query_values", Array::columns(pose.evaluate(&query).as_ref())),
+            ])
+        },
+    )
+}
+
+fn sites(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let points = inputs.points("P")?;
+    let x = inputs.matrix("X")?;
+    let count = inputs.integer("count")?;
+    same_count("P", points.len(), x.ncols())?;
+    call(
+        move || {
+            let all = vec![true; points.len()];
+            site_order(&points, x.as_ref(), count, &all).map_err(StageError::from_error)
+        },
+        |found| {
+            Bundle::from([
+                ("order", Array::indices(&found.order)),
+                ("errors", Array::vector(&found.errors)),
+            ])
+        },
+    )
+}
+
+fn parameters(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let points = inputs.points("P")?;
+    call(
+        move || Ok(centripetal(&points)),
+        |t| Bundle::from([("t", Array::vector(t))]),
+    )
+}
+
+fn knot_vector(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let t = inputs.vector("t")?.to_vec();
+    let k = inputs.integer("k")?;
+    let rule: KnotRule = rule(inputs)?;
+    call(
+        move || knots(&t, k, rule).map_err(StageError::from_error),
+        |u| Bundle::from([("u", Array::vector(u))]),
+    )
+}
+
+fn rule(inputs: &Bundle) -> Result<KnotRule, StageError> {
+    inputs.text("rule")?.parse().map_err(StageError::from_error)
+}
+
+fn spline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let t = inputs.vector("t")?.to_vec();
+    let u = inputs.vector("u")?.to_vec();
+    let points = inputs.points("P")?;
+    let query = inputs.vector("query")?.to_vec();
+    let frames = t.clone();
+    call(
+        move || Spline::fit(&t, &points, &u).map_err(StageError::from_error),
+        move |spline| {
+            Bundle::from([
+                ("control", Array::points(&spline.control)),
+                ("values", Array::points(&spline.evaluate_all(&frames))),
+                ("query_values", Array::points(&spline.evaluate_all(&query))),
+            ])
+        },
+    )
+}
+
+fn rho(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let t = inputs.vector("t")?.to_vec();
+    let query = inputs.vector("query")?.to_vec();
+    call(
+        move || {
+            let rho = Rho::new(&t);
+            let values: Vec<f64> = query.iter().map(|&q| rho.evaluate(q)).collect();
+            Ok((rho, values))
+        },
+        |(rho, values)| {
+            Bundle::from([
+                ("values", Array::vector(values)),
+                ("slopes", Array::vector(rho.slopes())),
+            ])
+        },
+    )
+}
+
+/// The representation that the arrays of `signal.psi` describe.
+pub fn representation(inputs: &Bundle) -> Result<Representation, StageError> {
+    let knots = inputs.vector("u")?.to_vec();
+    let control = inputs.points("control")?;
+    let sites = inputs.points("sites")?;
+    let coefficients = inputs.matrix("g")?;
+    let basis = inputs.matrix("H")?;
+    let offset = inputs.vector("h0")?.to_vec();
+    same_count("u", knots.len(), control.len() + 2)?;
+    same_count("g", coefficients.ncols(), sites.len() + 3)?;
+    same_count("h0", offset.len(), basis.nrows())?;
+    same_count("H", basis.ncols(), coefficients.nrows())?;
+    Ok(Representation {
+        time: TimeSignal::new(Spline { control, knots }, inputs.vector("t")?.to_vec()),
+        pose: PoseSignal {
+            sites,
+            coefficients,
+        },
+        offset,
+        basis,
+    })
+}
+
+/// The arrays of `signal.psi` that describe a representation.
+pub fn representation_arrays(r: &Representation) -> Bundle {
+    Bundle::from([
+        ("h0", Array::vector(&r.offset)),
+        ("H", Array::columns(r.basis.as_ref())),
+        ("sites", Array::points(&r.pose.sites)),
+        ("g", Array::columns(r.pose.coefficients.as_ref())),
+        ("control", Array::points(&r.time.spline.control)),
+        ("u", Array::vector(&r.time.spline.knots)),
+        ("t", Array::vector(&r.time.parameters)),
+    ])
+}
+
+fn psi(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let representation = representation(inputs)?;
+    let times = inputs.vector("tau")?.to_vec();
+    let shape = [times.len(), representation.dimension()];
+    call(
+        move || Ok(representation.evaluate(&times)),
+        move |frames| Bundle::from([("Z", frames_array(shape, frames))]),
+    )
+}
+
+fn frames_array(shape: [usize; 2], frames: &[f64]) -> Array {
+    Array::F64 {
+        shape: shape.to_vec(),
+        data: frames.to_vec(),
+    }
+}
+
+fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let frames: Mat<f64> = inputs.matrix("Z")?;
+    let options = FitOptions {
+        k: inputs.integer("k")?,
+        l: inputs.integer("l")?,
+        m: inputs.integer("m")?,
+        knots: rule(inputs)?,
+        pins: Vec::new(),
+    };
+    let n = frames.ncols();
+    call(
+        move || fit(frames.as_ref(), &options).map_err(StageError::from_error),
+        move |fit| {
+            let e = fit.errors;
+            let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+            let frames = fit.representation.evaluate(&times);
+            let d = fit.representation.dimension();
+            Bundle::from([
+                ("errors", Array::vector(&[e.h, e.g, e.f, e.psi])),
+                ("Z", frames_array([n, d], &frames)),
+                ("P", Array::points(&fit.positions)),
+                ("order", Array::indices(&fit.sites.order)),
+            ])
+        },
+    )
+}
+
+/// Inputs of every stage made from a sequence by the Rust stages before it, so that errors do not pile up.
+pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<Bundle, StageError> {
+    let z = Array::columns(frames);
+    let [k, l, m] = [choice.k, choice.l, choice.m].map(Array::integer);
+    if stage == "signal.h" {
+        return Ok(Bundle::from([("Z", z), ("m", m)]));
+    }
+    if stage == "signal" {
+        let rule = Array::Text(choice.knots.to_string());
+        return Ok(Bundle::from([("Z", z), ("k", k), ("l", l), ("m", m), ("rule", rule)]));
+    }
+    Chain::new(frames, choice)?.inputs(stage)
+}
+
+/// k, l, m, the knot rule, and how many frames are pinned where a stage has pins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    pub k: usize,
+    pub l: usize,
+    pub m: usize,
+    pub knots: KnotRule,
+    pub pins: usize,
+}
+
+/// The reconstruction, from which the inputs of its stages are taken.
+struct Chain<'a> {
+    fit: crate::signal::fit::Fit,
+    start: Vec<[f64; 2]>,
+    choice: &'a Choice,
+    times: Vec<f64>,
+}
+
+impl<'a> Chain<'a> {
+    fn new(frames: MatRef<'_, f64>, choice: &'a Choice) -> Result<Self, StageError> {
+        let options = FitOptions {
+            k: choice.k,
+            l: choice.l,
+            m: choice.m,
+            knots: choice.knots,
+            pins: Vec::new(),
+        };
+        let fit = fit(frames, &options).map_err(StageError::from_error)?;
+        let n = frames.ncols();
+        Ok(Self {
+            start: crate::signal::pins::principal_start(fit.coordinates.as_ref(), &[]),
+            fit,
+            choice,
+            times: between_frames(n),
+        })
+    }
+
+    fn inputs(&self, stage: &str) -> Result<Bundle, StageError> {
+        let time = &self.fit.representation.time;
+        let x = || ("X", Array::columns(self.fit.coordinates.as_ref()));
+        let p = || ("P", Array::points(&self.fit.positions));
+        let t = || ("t", Array::vector(&time.parameters));
+        Ok(match stage {
+            "signal.mds" => Bundle::from([x(), ("start", Array::points(&self.start))]),
+            "signal.mds_fixed" => self.pinned(),
+            "signal.rbf" => Bundle::from([
+                x(),
+                p(),
+                ("sites", Array::indices(&self.fit.sites.order)),
+                ("query", Array::points(&self.curve())),
+            ]),
+            "signal.sites" => {
+                let frames = self.fit.positions.len();
+                Bundle::from([x(), p(), ("count", Array::integer(frames))])
+            }
+            "signal.parameters" => Bundle::from([p()]),
+            "signal.knots" => Bundle::from([
+                ("t", Array::vector(&crate::signal::parameters::distinct(&time.parameters))),
+                ("k", Array::integer(time.spline.control.len())),
+                ("rule", Array::Text(self.choice.knots.to_string())),
+            ]),
+            "signal.spline" => Bundle::from([
+                t(),
+                p(),
+                ("u", Array::vector(&time.spline.knots)),
+                ("query", Array::vector(&self.parameters())),
+            ]),
+            "signal.rho" => Bundle::from([t(), ("query", Array::vector(&self.times))]),
+            "signal.psi" => {
+                let mut inputs = representation_arrays(&self.fit.representation);
+                inputs.put("tau", Array::vector(&self.times));
+                inputs
+            }
+            _ => return Err(StageError::Failed(format!("there is no stage `{stage}` in signal"))),
+        })
+    }
+
+    /// The first frames pinned a little away from where scaling would put them.
+    fn pinned(&self) -> Bundle {
+        let n = self.start.len();
+        let count = self.choice.pins.min(n);
+        let fixed: Vec<usize> = (0..count).map(|i| i * n / count).collect();
+        let mut start = self.start.clone();
+        for &i in &fixed {
+            start[i] = [1.1 * self.fit.positions[i][0], 0.9 * self.fit.positions[i][1]];
+        }
+        let positions: Vec<[f64; 2]> = fixed.iter().map(|&i| start[i]).collect();
+        Bundle::from([
+            ("X", Array::columns(self.fit.coordinates.as_ref())),
+            ("start", Array::points(&start)),
+            ("fixed", Array::indices(&fixed)),
+            ("positions", Array::points(&positions)),
+        ])
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        let rho = Rho::new(&self.fit.representation.time.parameters);
+        self.times.iter().map(|&t| rho.evaluate(t)).collect()
+    }
+
+    fn curve(&self) -> Vec<[f64; 2]> {
+        let time = &self.fit.representation.time;
+        self.times.iter().map(|&t| time.evaluate(t)).collect()
+    }
+}
+
+/// Frame times and times between them: 1, 1.3, 2, 2.3, ...; at most 64 pairs, spread evenly.
+fn between_frames(n: usize) -> Vec<f64> {
+    let step = n.div_ceil(64).max(1);
+    (1..=n)
+        .step_by(step)
+        .flat_map(|i| [i as f64, (i as f64 + 0.3).min(n as f64)])
+        .collect()
+}
