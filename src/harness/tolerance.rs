@@ -1,0 +1,156 @@
+//! Every tolerance and its reason. A case may ask for another, with a reason of its own.
+//!
+//! Lengths are relative to the diagonal of the box around the first frame or the layout, sums of squares to themselves or, below that, to a
+//! millionth of the data's.
+
+/// What a quantity is held against.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    pub value: f64,
+    pub reason: String,
+}
+
+struct Entry {
+    stage: &'static str,
+    quantity: &'static str,
+    value: f64,
+    reason: &'static str,
+}
+
+macro_rules! tolerances {
+    ($($stage:literal { $($quantity:literal <= $value:literal, $reason:literal;)* })*) => {
+        const TOLERANCES: &[Entry] = &[$($(Entry { stage: $stage, quantity: $quantity, value: $value, reason: $reason },)*)*];
+    };
+}
+
+tolerances! {
+    "sequence.read" {
+        "impossible" <= 0.0, "an area is not negative and a box not inside out";
+        "count_differences" <= 0.0, "counts are whole numbers";
+        "area_difference" <= 1e-12, "the same sum in another order, over the squared diagonal";
+        "volume_difference" <= 1e-12, "the same sum in another order, over the cubed diagonal";
+        "bounds_difference" <= 1e-15, "the same decimal digits give the same double";
+    }
+    "sequence.distance" {
+        "brute_force" <= 1e-12, "the same distances, triangle by triangle";
+        "mean_above_greatest" <= 1e-15, "a mean is not above its greatest term";
+        "hausdorff_difference" <= 1e-12, "exact distances up to rounding";
+        "mean_difference" <= 1e-12, "exact distances up to rounding";
+    }
+    "signal.h" {
+        "mean" <= 1e-14, "a mean of n frames";
+        "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";
+        "projection" <= 1e-10, "coordinates are projections, up to the orthonormality lost";
+        "sign" <= 0.0, "the entry of largest magnitude is positive (reading 9)";
+        "too_many_dimensions" <= 0.0, "at most m";
+        "error_h_difference" <= 1e-10, "second order in the error of the subspace";
+        "dimension_difference" <= 0.0, "m is cut to the rank by one rule (PROTOCOL.md)";
+        "sigma_difference" <= 1e-10, "over the norm of the data";
+        "coordinate_difference" <= 1e-9, "up to sign, and up to turns where singular values are equal to 1e-6";
+    }
+    "signal.mds" {
+        "above_start" <= 1e-12, "majorisation never rises";
+        "stress_difference" <= 1e-6, "SMACOF alone stops before the minimum";
+        "position_difference" <= 1e-8, "after the best rigid motion, where both gradients vanish";
+    }
+    "signal.mds_fixed" {
+        "above_start" <= 1e-12, "majorisation never rises";
+        "pins_moved" <= 0.0, "pins stay where they are put";
+        "stress_difference" <= 1e-9, "both end with a second-order method";
+        "position_difference" <= 1e-8, "where both gradients vanish; pins leave no motion";
+    }
+    "signal.rbf" {
+        "side_conditions" <= 1e-10, "coefficients come from a null space";
+        "formula" <= 1e-9, "values are those of the coefficients";
+        "stationarity" <= 1e-10, "a least-squares residual is orthogonal to the space";
+        "error_g_difference" <= 1e-9, "least squares by another factorisation";
+        "value_difference" <= 1e-9, "least squares by another factorisation";
+        "query_difference" <= 1e-8, "between frames the conditioning of the kernels shows";
+    }
+    "signal.sites" {
+        "errors" <= 1e-10, "each error again from scratch, over the data";
+        "greedy" <= 1e-6, "the next site is the worst frame, up to ties";
+        "start" <= 1e-6, "the first four are the farthest from the best-fit plane, up to ties";
+        "rising" <= 1e-13, "spaces are nested";
+        "order_gap" <= 1e-6, "orders may part only at ties of the argmax";
+        "errors_difference" <= 1e-9, "up to where the orders part, over the data";
+        "count_difference" <= 0.0, "the same number of sites";
+    }
+    "signal.parameters" {
+        "first" <= 0.0, "t_1 = 0 (reading 8)";
+        "steps" <= 1e-12, "squared steps are distances";
+        "t_difference" <= 1e-12, "a cumulative sum";
+    }
+    "signal.knots" {
+        "ends" <= 0.0, "clamped ends are copies (reading 1)";
+        "falling" <= 0.0, "knots do not decrease";
+        "averages" <= 1e-12, "reading 2 as a piecewise linear function";
+        "u_difference" <= 1e-12, "averages of neighbours";
+    }
+    "signal.spline" {
+        "formula" <= 1e-12, "values are those of the control points";
+        "stationarity" <= 1e-10, "a least-squares residual is orthogonal to the space";
+        "error_f_difference" <= 1e-9, "least squares by another factorisation";
+        "value_difference" <= 1e-9, "least squares by another factorisation";
+        "query_difference" <= 1e-9, "least squares by another factorisation";
+    }
+    "signal.rho" {
+        "formula" <= 1e-13, "the cubic Hermite formula";
+        "slopes" <= 1e-12, "reading 7 written out";
+        "falling" <= 1e-14, "monotone data give a monotone curve";
+        "value_difference" <= 1e-12, "the same cubic";
+        "slope_difference" <= 1e-12, "the same slopes";
+    }
+    "signal.psi" {
+        "formula" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
+        "frame_difference" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
+    }
+    "signal" {
+        "claimed_error_psi" <= 1e-9, "error (2) again from the frames";
+        "error_h_difference" <= 1e-10, "as signal.h";
+        "error_g_difference" <= 1e-7, "positions agree to 1e-8 (signal.mds)";
+        "error_f_difference" <= 1e-6, "positions agree to 1e-8, and the square root of the parameters magnifies short steps";
+        "error_psi_difference" <= 1e-6, "as error (7)";
+        "frame_difference" <= 1e-6, "as error (7)";
+        "position_difference" <= 1e-8, "as signal.mds";
+    }
+}
+
+/// Our own second-order method must reach a vanishing gradient.
+const RUST_GRADIENT: f64 = 1e-12;
+/// Engines that hold f32 somewhere.
+const SINGLE: [(&str, &str); 3] = [
+    ("openmesh", "OpenMesh parses OBJ coordinates as f32"),
+    ("tobj", "tobj holds f32"),
+    ("pymeshlab", "MeshLab measures distances in f32"),
+];
+
+/// The tolerance of a quantity, none where it is only reported.
+pub fn find(stage: &str, quantity: &str, engine: &str) -> Option<Tolerance> {
+    if quantity == "gradient" && engine == "rust" {
+        return Some(Tolerance {
+            value: RUST_GRADIENT,
+            reason: "Newton's method ends at a vanishing gradient (reading 6)".into(),
+        });
+    }
+    let entry = TOLERANCES
+        .iter()
+        .find(|e| e.stage == stage && e.quantity == quantity)?;
+    let single = SINGLE.iter().find(|(name, _)| *name == engine);
+    let touched = stage.starts_with("sequence.") && quantity.ends_with("_difference");
+    match single {
+        Some((_, reason)) if touched && entry.value > 0.0 => Some(Tolerance {
+            value: entry.value.max(1e-6),
+            reason: (*reason).into(),
+        }),
+        _ => Some(Tolerance {
+            value: entry.value,
+            reason: entry.reason.into(),
+        }),
+    }
+}
+
+/// Whether a case may name this quantity of this stage.
+pub fn is_checked(stage: &str, quantity: &str) -> bool {
+    find(stage, quantity, "rust").is_some()
+}
