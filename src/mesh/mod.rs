@@ -1,5 +1,10 @@
 //! Triangle meshes: validated connectivity and what is measured on it.
 
 mod connectivity;
+pub mod distance;
+pub mod edges;
+pub mod measure;
+mod triangle;
+mod vector;
 
 pub use connectivity::{Connectivity, ConnectivityError};

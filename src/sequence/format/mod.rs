@@ -1,0 +1,88 @@
+//! File formats of sequences: OBJ frames, NPZ and PC2.
+//!
+//! | path | what it holds |
+//! |---|---|
+//! | a folder, a pattern `dir/mesh_*.obj`, one `.obj` | OBJ frames in natural order (frame 2 before frame 10), f64 |
+//! | `.npz` | numpy arrays `V` (n, V, 3) of f64 or f32 and `F` (F, 3) of 0-based integers |
+//! | `.pc2` | positions in f32, and beside it an OBJ with the faces |
+//!
+//! Files come from strangers: sizes in a header are held against the file before memory is reserved, nothing is repaired,
+//! and every refusal says where and what to do. Writing leaves the whole result or nothing.
+
+mod bytes;
+mod error;
+mod files;
+mod natural;
+pub mod npz;
+mod obj;
+mod pc2;
+pub mod peer_tobj;
+
+use std::path::Path;
+
+use super::Sequence;
+pub use error::FormatError;
+pub use files::frame_files;
+use files::has_extension;
+pub use natural::compare as natural_order;
+pub use obj::ObjProblem;
+
+/// Reads the sequence at `path`; see the table above and [`frame_files`].
+///
+/// Positions arrive in the file's own vertex order: from OBJ correctly rounded to f64, from f32 files widened. All frames
+/// must have the same vertex count and the same triangles in the same order.
+pub fn read(path: &Path) -> Result<Sequence, FormatError> {
+    if !path.is_dir() {
+        if has_extension(path, "npz") {
+            return npz::read(path);
+        }
+        if has_extension(path, "pc2") {
+            return pc2::read(path);
+        }
+    }
+    obj::read(&frame_files(path)?)
+}
+
+/// Writes `sequence` to `path`, in the format its ending names: `.npz` and OBJ keep every bit, `.pc2` rounds to f32.
+///
+/// - `.npz`: see [`npz::write`];
+/// - `.pc2`: with the first frame and the faces beside it in the `.obj` of the same stem;
+/// - `.obj`: one file, for a sequence of one frame;
+/// - otherwise a folder of `0001.obj`, `0002.obj`, ... which may exist when all it holds are OBJ files: it is replaced.
+///
+/// Everything is written under a temporary name in the same folder and then renamed, so that a full disk or a missing
+/// permission leaves what was there before. Existing files of these formats are replaced. The same sequence always
+/// gives the same bytes.
+pub fn write(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
+    if has_extension(path, "npz") {
+        npz::write(sequence, path)
+    } else if has_extension(path, "pc2") {
+        pc2::write(sequence, path)
+    } else if has_extension(path, "obj") {
+        write_single(sequence, path)
+    } else if OTHER_FORMATS.iter().any(|e| has_extension(path, e)) {
+        Err(FormatError::Unsupported {
+            path: path.to_path_buf(),
+        })
+    } else {
+        obj::write_frames(sequence, path)
+    }
+}
+
+/// Endings that ask for something else than a folder of this name.
+const OTHER_FORMATS: [&str; 18] = [
+    "abc", "bin", "csv", "fbx", "glb", "gltf", "html", "json", "mdd", "npy", "off", "ply", "stl",
+    "txt", "usd", "usda", "usdc", "zip",
+];
+
+fn write_single(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
+    match sequence.frame_count() {
+        1 => bytes::write_file(path, |out| obj::write_frame(sequence, 0, out)),
+        frames => Err(FormatError::CannotHold {
+            path: path.to_path_buf(),
+            reason: format!(
+                "an OBJ file holds one frame, this sequence has {frames}; name a folder, a .npz or a .pc2"
+            ),
+        }),
+    }
+}

@@ -1,0 +1,189 @@
+//! Archives of stored entries whose bytes depend on their contents only.
+
+use std::io::{self, Write};
+
+use flate2::Crc;
+
+/// 1 January 1980, the first date that ZIP knows: the same in every file.
+const DATE: u16 = 0x21;
+/// From here on, a size or an offset goes into a ZIP64 field.
+const LARGE: u64 = u32::MAX as u64;
+
+/// One entry: its name, and its contents in parts that can be produced again and again.
+pub(super) struct Entry<'a> {
+    pub(super) name: String,
+    pub(super) length: u64,
+    /// Passes the contents, in parts of any length, to its argument.
+    pub(super) produce: &'a dyn Fn(&mut dyn FnMut(&[u8]) -> io::Result<()>) -> io::Result<()>,
+}
+
+struct Written {
+    name: String,
+    length: u64,
+    crc: u32,
+    at: u64,
+}
+
+/// Writes the entries and their directory. Every entry is produced twice: for its checksum and to be written.
+pub(super) fn write(out: &mut impl Write, entries: &[Entry]) -> io::Result<()> {
+    write_from(out, entries, LARGE)
+}
+
+fn write_from(out: &mut impl Write, entries: &[Entry], large: u64) -> io::Result<()> {
+    let mut at = 0;
+    let mut directory = Vec::new();
+    for entry in entries {
+        let mut crc = Crc::new();
+        (entry.produce)(&mut |part| {
+            crc.update(part);
+            Ok(())
+        })?;
+        let written = Written {
+            name: entry.name.clone(),
+            length: entry.length,
+            crc: crc.sum(),
+            at,
+        };
+        let header = written.local_header(large);
+        out.write_all(&header)?;
+        (entry.produce)(&mut |part| out.write_all(part))?;
+        at += header.len() as u64 + entry.length;
+        directory.extend(written.directory_entry(large));
+    }
+    out.write_all(&directory)?;
+    out.write_all(&end(
+        entries.len() as u64,
+        directory.len() as u64,
+        at,
+        large,
+    ))
+}
+
+impl Written {
+    fn local_header(&self, large: u64) -> Vec<u8> {
+        let extra = match self.length >= large {
+            true => zip64(&[self.length, self.length]),
+            false => Vec::new(),
+        };
+        let mut bytes = b"PK\x03\x04".to_vec();
+        self.common(&mut bytes, &extra, large);
+        bytes.extend(self.name.bytes());
+        bytes.extend(extra);
+        bytes
+    }
+
+    fn directory_entry(&self, large: u64) -> Vec<u8> {
+        let mut wide = Vec::new();
+        if self.length >= large {
+            wide.extend([self.length, self.length]);
+        }
+        if self.at >= large {
+            wide.push(self.at);
+        }
+        let extra = zip64(&wide);
+        let mut bytes = b"PK\x01\x02".to_vec();
+        bytes.extend(version(!extra.is_empty()).to_le_bytes());
+        self.common(&mut bytes, &extra, large);
+        // No comment, disk 0, no attributes.
+        bytes.extend([0; 10]);
+        bytes.extend(narrow(self.at, large).to_le_bytes());
+        bytes.extend(self.name.bytes());
+        bytes.extend(extra);
+        bytes
+    }
+
+    /// What a local header and a directory entry share: version needed, flags, method, date, checksum, sizes, lengths.
+    fn common(&self, bytes: &mut Vec<u8>, extra: &[u8], large: u64) {
+        let utf8_name: u16 = if self.name.is_ascii() { 0 } else { 1 << 11 };
+        for field in [version(!extra.is_empty()), utf8_name, 0, 0, DATE] {
+            bytes.extend(field.to_le_bytes());
+        }
+        let length = narrow(self.length, large);
+        for field in [self.crc, length, length] {
+            bytes.extend(field.to_le_bytes());
+        }
+        for length in [self.name.len(), extra.len()] {
+            bytes.extend((length as u16).to_le_bytes());
+        }
+    }
+}
+
+fn version(zip64: bool) -> u16 {
+    if zip64 { 45 } else { 20 }
+}
+
+fn narrow(value: u64, large: u64) -> u32 {
+    if value >= large {
+        u32::MAX
+    } else {
+        value as u32
+    }
+}
+
+/// The extra field of numbers beyond 32 bits; nothing when there are none.
+fn zip64(values: &[u64]) -> Vec<u8> {
+    if values.is_empty() {
+        return Vec::new();
+    }
+    let mut bytes = 1u16.to_le_bytes().to_vec();
+    bytes.extend((values.len() as u16 * 8).to_le_bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    bytes
+}
+
+fn end(entries: u64, size: u64, at: u64, large: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if at >= large || size >= large || entries >= 0xFFFF {
+        bytes.extend(b"PK\x06\x06");
+        bytes.extend(44u64.to_le_bytes());
+        bytes.extend([45, 0, 45, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        for field in [entries, entries, size, at] {
+            bytes.extend(field.to_le_bytes());
+        }
+        bytes.extend(b"PK\x06\x07\0\0\0\0");
+        bytes.extend((at + size).to_le_bytes());
+        bytes.extend(1u32.to_le_bytes());
+    }
+    let count = entries.min(0xFFFF) as u16;
+    bytes.extend(b"PK\x05\x06\0\0\0\0");
+    bytes.extend([count.to_le_bytes(), count.to_le_bytes()].concat());
+    bytes.extend(narrow(size, large).to_le_bytes());
+    bytes.extend(narrow(at, large).to_le_bytes());
+    bytes.extend([0, 0]);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    /// Another ZIP reader (npyz, through the zip crate) must read what we write, below and beyond the ZIP64 threshold.
+    #[test]
+    fn another_reader_agrees() {
+        for large in [LARGE, 0, 100] {
+            let array = [
+                crate::sequence::format::npz::npy::header("<f8", &[2]),
+                vec![0; 16],
+            ]
+            .concat();
+            let produce = |sink: &mut dyn FnMut(&[u8]) -> io::Result<()>| sink(&array);
+            let entry = |name: &str| Entry {
+                name: name.into(),
+                length: array.len() as u64,
+                produce: &produce,
+            };
+            let mut bytes = Vec::new();
+            write_from(&mut bytes, &[entry("a.npy"), entry("ä.npy")], large).unwrap();
+            let mut archive = npyz::npz::NpzArchive::new(Cursor::new(bytes)).unwrap();
+            for name in ["a", "ä"] {
+                let read = archive.by_name(name).unwrap().unwrap();
+                assert_eq!(
+                    read.into_vec::<f64>().unwrap(),
+                    [0.0, 0.0],
+                    "{large} {name}"
+                );
+            }
+        }
+    }
+}
