@@ -63,7 +63,8 @@ impl Array {
         }
     }
 
-    fn describe(&self) -> String {
+    /// What this is, for a message: `f64 [2, 3]`.
+    pub fn describe(&self) -> String {
         match self {
             Self::F64 { shape, .. } | Self::I64 { shape, .. } => {
                 format!("{} {shape:?}", self.kind())

@@ -15,8 +15,11 @@
 //! | [`cmd`] | the command line, one file a verb |
 
 pub mod arrays;
+pub mod cmd;
 pub mod harness;
 pub mod linalg;
 pub mod mesh;
+pub mod report;
 pub mod sequence;
 pub mod signal;
+pub mod stages;

@@ -154,7 +154,9 @@ pub fn read_all(folder: &Path) -> Result<Vec<Case>, CaseError> {
 }
 
 fn order(stage: &str) -> usize {
-    stages::all().position(|s| s.name == stage).unwrap_or(usize::MAX)
+    stages::all()
+        .position(|s| s.name == stage)
+        .unwrap_or(usize::MAX)
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, CaseError> {
@@ -163,7 +165,9 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, CaseError> {
         source,
     };
     let listing = std::fs::read_dir(folder).map_err(failed)?;
-    listing.map(|entry| entry.map(|e| e.path()).map_err(failed)).collect()
+    listing
+        .map(|entry| entry.map(|e| e.path()).map_err(failed))
+        .collect()
 }
 
 fn read_file(root: &Path, path: &Path) -> Result<Vec<Case>, CaseError> {
@@ -176,7 +180,11 @@ fn read_file(root: &Path, path: &Path) -> Result<Vec<Case>, CaseError> {
         source: Box::new(source),
     })?;
     let stem = path.with_extension("");
-    let prefix = stem.strip_prefix(root).unwrap_or(&stem).to_string_lossy().into_owned();
+    let prefix = stem
+        .strip_prefix(root)
+        .unwrap_or(&stem)
+        .to_string_lossy()
+        .into_owned();
     file.cases
         .into_iter()
         .map(|entry| {
@@ -197,7 +205,11 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
     }
     let stage: &'static Stage = stages::find(&entry.stage).ok_or_else(|| {
         let known: Vec<&str> = stages::all().map(|s| s.name).collect();
-        format!("no stage `{}`; the stages are {}", entry.stage, known.join(", "))
+        format!(
+            "no stage `{}`; the stages are {}",
+            entry.stage,
+            known.join(", ")
+        )
     })?;
     Ok(Case {
         name: format!("{prefix}/{}", entry.name),
@@ -221,14 +233,17 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
 }
 
 fn knots(rule: Option<&str>) -> Result<KnotRule, String> {
-    rule.map_or(Ok(KnotRule::default()), |rule| rule.parse().map_err(|e| format!("{e}: `{rule}`")))
+    rule.map_or(Ok(KnotRule::default()), |rule| {
+        rule.parse().map_err(|e| format!("{e}: `{rule}`"))
+    })
 }
 
 fn expectations(texts: &BTreeMap<String, String>) -> Result<BTreeMap<String, Printed>, String> {
     texts
         .iter()
         .map(|(quantity, text)| {
-            let printed = printed(text).ok_or_else(|| format!("expect `{text}`: expected a decimal number in quotes"))?;
+            let printed = printed(text)
+                .ok_or_else(|| format!("expect `{text}`: expected a decimal number in quotes"))?;
             Ok((quantity.clone(), printed))
         })
         .collect()
@@ -241,7 +256,9 @@ fn printed(text: &str) -> Option<Printed> {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
         None => (text, 0),
     };
-    let decimals = mantissa.split_once('.').map_or(0, |(_, digits)| digits.len()) as i32;
+    let decimals = mantissa
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len()) as i32;
     Some(Printed {
         value,
         half_unit: 0.5 * 10f64.powi(exponent - decimals),
@@ -252,13 +269,22 @@ fn tolerances(stage: &str, checks: Vec<Check>) -> Result<BTreeMap<String, Tolera
     let mut found = BTreeMap::new();
     for check in checks {
         if !tolerance::is_checked(stage, &check.quantity) {
-            return Err(format!("`{}` is no checked quantity of {stage}", check.quantity));
+            return Err(format!(
+                "`{}` is no checked quantity of {stage}",
+                check.quantity
+            ));
         }
         if check.reason.trim().len() < 10 {
-            return Err(format!("the tolerance of `{}` needs a reason", check.quantity));
+            return Err(format!(
+                "the tolerance of `{}` needs a reason",
+                check.quantity
+            ));
         }
         if !(check.tolerance.is_finite() && check.tolerance >= 0.0) {
-            return Err(format!("the tolerance of `{}` is no positive number", check.quantity));
+            return Err(format!(
+                "the tolerance of `{}` is no positive number",
+                check.quantity
+            ));
         }
         let tolerance = Tolerance {
             value: check.tolerance,
@@ -301,7 +327,10 @@ impl Frames {
     pub fn indices(&self, n: usize) -> Result<Vec<usize>, String> {
         let last = self.last.unwrap_or(n);
         if self.first > n || last > n {
-            return Err(format!("frames {}..{last} of a sequence of {n} frames", self.first));
+            return Err(format!(
+                "frames {}..{last} of a sequence of {n} frames",
+                self.first
+            ));
         }
         Ok((self.first - 1..last).step_by(self.step).collect())
     }
@@ -316,7 +345,8 @@ pub fn select(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, CaseEr
             });
         }
     }
-    let wanted = |case: &Case| patterns.is_empty() || patterns.iter().any(|p| matches(p, &case.name));
+    let wanted =
+        |case: &Case| patterns.is_empty() || patterns.iter().any(|p| matches(p, &case.name));
     Ok(cases.into_iter().filter(wanted).collect())
 }
 
@@ -334,7 +364,13 @@ fn matches(pattern: &str, name: &str) -> bool {
     }
     (0..=rest.len())
         .filter(|&at| rest.is_char_boundary(at))
-        .any(|at| if tail.contains('*') { matches(tail, &rest[at..]) } else { &rest[at..] == tail })
+        .any(|at| {
+            if tail.contains('*') {
+                matches(tail, &rest[at..])
+            } else {
+                &rest[at..] == tail
+            }
+        })
 }
 
 #[cfg(test)]

@@ -47,13 +47,17 @@ fn paired<'a, T: Copy>(
     before: &BTreeMap<Key<'a>, T>,
     after: &BTreeMap<Key<'a>, T>,
 ) -> Vec<(Key<'a>, T, Option<T>)> {
-    before.iter().map(|(&key, &b)| (key, b, after.get(&key).copied())).collect()
+    before
+        .iter()
+        .map(|(&key, &b)| (key, b, after.get(&key).copied()))
+        .collect()
 }
 
 fn verdicts(before: &Record, after: &Record) -> Vec<Change> {
     fn table(record: &Record) -> BTreeMap<Key<'_>, Verdict> {
         let rows = record.agreement.iter();
-        rows.map(|r| ((r.case.as_str(), r.engine.as_str(), "verdict"), r.verdict)).collect()
+        rows.map(|r| ((r.case.as_str(), r.engine.as_str(), "verdict"), r.verdict))
+            .collect()
     }
     paired(&table(before), &table(after))
         .into_iter()
@@ -69,16 +73,27 @@ fn accuracy(before: &Record, after: &Record) -> Vec<Change> {
     type Value = (f64, Option<f64>);
     fn table(record: &Record) -> BTreeMap<Key<'_>, Value> {
         let rows = record.accuracy.iter();
-        rows.map(|r| ((r.case.as_str(), r.engine.as_str(), r.quantity.as_str()), (r.value, r.tolerance)))
-            .collect()
+        rows.map(|r| {
+            (
+                (r.case.as_str(), r.engine.as_str(), r.quantity.as_str()),
+                (r.value, r.tolerance),
+            )
+        })
+        .collect()
     }
     paired(&table(before), &table(after))
         .into_iter()
         .filter_map(|(key, (b, _), a)| {
             let (a, tolerance) = a?;
             let allowed = tolerance.unwrap_or(GROWN * b.abs().max(1e-12));
-            ((a - b).abs() > allowed || a.is_nan() != b.is_nan())
-                .then(|| changed(key, format!("{b:.6e}"), format!("{a:.6e}"), a.is_nan() || a > b))
+            ((a - b).abs() > allowed || a.is_nan() != b.is_nan()).then(|| {
+                changed(
+                    key,
+                    format!("{b:.6e}"),
+                    format!("{a:.6e}"),
+                    a.is_nan() || a > b,
+                )
+            })
         })
         .collect()
 }
@@ -86,7 +101,13 @@ fn accuracy(before: &Record, after: &Record) -> Vec<Change> {
 fn speed(before: &Record, after: &Record) -> Vec<Change> {
     fn table(record: &Record) -> BTreeMap<Key<'_>, f64> {
         let rows = record.timing.iter().filter(|r| r.engine != "rust");
-        rows.map(|r| ((r.case.as_str(), r.engine.as_str(), "time over rust"), r.ratio_to_rust)).collect()
+        rows.map(|r| {
+            (
+                (r.case.as_str(), r.engine.as_str(), "time over rust"),
+                r.ratio_to_rust,
+            )
+        })
+        .collect()
     }
     paired(&table(before), &table(after))
         .into_iter()

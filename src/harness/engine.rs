@@ -38,7 +38,7 @@ pub enum Outcome {
 }
 
 /// Something that can run a stage.
-pub trait Engine {
+pub trait Engine: Send {
     /// As in reports and in `--engine`.
     fn name(&self) -> &str;
     /// The stages it may be asked.
@@ -275,15 +275,15 @@ impl Engine for OracleProcess {
 
     fn version(&mut self) -> Result<String, String> {
         let request = Bundle::from([("op", Array::Text("version".into()))]);
-        let reply = self
-            .exchange(request, Duration::from_secs(60))
-            .map_err(|outcome| match outcome {
-                Outcome::Missing(why) => why,
-                Outcome::Error(why) | Outcome::Timeout(why) => {
-                    format!("{why}; to get it: {}", self.oracle.install)
-                }
-                other => format!("{other:?}"),
-            })?;
+        let reply =
+            self.exchange(request, Duration::from_secs(60))
+                .map_err(|outcome| match outcome {
+                    Outcome::Missing(why) => why,
+                    Outcome::Error(why) | Outcome::Timeout(why) => {
+                        format!("{why}; to get it: {}", self.oracle.install)
+                    }
+                    other => format!("{other:?}"),
+                })?;
         reply
             .text("version")
             .map(str::to_owned)
@@ -308,7 +308,12 @@ impl Engine for OracleProcess {
 }
 
 fn read_reply(reply: Bundle, samples: usize) -> Outcome {
-    let message = || reply.text("message").unwrap_or("it did not say why").to_owned();
+    let message = || {
+        reply
+            .text("message")
+            .unwrap_or("it did not say why")
+            .to_owned()
+    };
     match reply.text("status") {
         Ok("ok") => {}
         Ok("unsupported") => return Outcome::Unsupported(message()),
@@ -321,7 +326,9 @@ fn read_reply(reply: Bundle, samples: usize) -> Outcome {
         Err(error) => return Outcome::Error(error.to_string()),
     };
     if seconds.len() != samples || seconds.iter().any(|&s| s.is_nan() || s <= 0.0) {
-        return Outcome::Error(format!("expected {samples} positive times, found {seconds:?}"));
+        return Outcome::Error(format!(
+            "expected {samples} positive times, found {seconds:?}"
+        ));
     }
     let mut outputs = Bundle::default();
     for (name, array) in reply.0 {

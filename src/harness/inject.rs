@@ -201,12 +201,17 @@ fn swap_rows(data: &mut [f64], width: usize, a: usize, b: usize) {
 
 fn negate_column(bundle: &mut Bundle, name: &str, column: usize) {
     let width = row_length(bundle, name);
-    numbers(bundle, name, |x| x.chunks_mut(width).for_each(|row| row[column] = -row[column]));
+    numbers(bundle, name, |x| {
+        x.chunks_mut(width)
+            .for_each(|row| row[column] = -row[column])
+    });
 }
 
 fn zero_last_column(bundle: &mut Bundle, name: &str) {
     let width = row_length(bundle, name);
-    numbers(bundle, name, |x| x.chunks_mut(width).for_each(|row| row[width - 1] = 0.0));
+    numbers(bundle, name, |x| {
+        x.chunks_mut(width).for_each(|row| row[width - 1] = 0.0)
+    });
 }
 
 fn copy(from: &Bundle, name: &str, to: &mut Bundle, target: &str) {
@@ -216,7 +221,11 @@ fn copy(from: &Bundle, name: &str, to: &mut Bundle, target: &str) {
 }
 
 fn other_rule(inputs: &mut Bundle) {
-    let other = if inputs.text("rule") == Ok("literal") { "symmetric" } else { "literal" };
+    let other = if inputs.text("rule") == Ok("literal") {
+        "symmetric"
+    } else {
+        "literal"
+    };
     inputs.put("rule", Array::Text(other.into()));
 }
 
@@ -242,7 +251,11 @@ impl Engine for Faulty {
     }
 
     fn version(&mut self) -> Result<String, String> {
-        Ok(format!("{}, wrong on purpose: {}", Rust.version()?, self.0.about))
+        Ok(format!(
+            "{}, wrong on purpose: {}",
+            Rust.version()?,
+            self.0.about
+        ))
     }
 
     fn ask(&mut self, question: &Question) -> Outcome {

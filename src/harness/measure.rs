@@ -45,7 +45,10 @@ pub fn measure(
             });
         }
     }
-    let slowest = runs.iter().map(|r| r.pilot * r.batch as f64).fold(1e-6, f64::max);
+    let slowest = runs
+        .iter()
+        .map(|r| r.pilot * r.batch as f64)
+        .fold(1e-6, f64::max);
     let rounds = ((BUDGET_SECONDS / slowest) as usize).clamp(ROUNDS.0, ROUNDS.1);
     for _ in 0..rounds {
         for run in &mut runs {
@@ -87,7 +90,11 @@ fn ask(
     }
 }
 
-fn rows(case: &Case, engines: &[Box<dyn Engine>], runs: &[Run]) -> (Vec<TimingRow>, Vec<SampleRow>) {
+fn rows(
+    case: &Case,
+    engines: &[Box<dyn Engine>],
+    runs: &[Run],
+) -> (Vec<TimingRow>, Vec<SampleRow>) {
     let rust = runs
         .iter()
         .find(|run| engines[run.place].name() == "rust")
@@ -110,12 +117,17 @@ fn rows(case: &Case, engines: &[Box<dyn Engine>], runs: &[Run]) -> (Vec<TimingRo
             published_source: published.map(|p| p.1.clone()).unwrap_or_default(),
             engine: engine.clone(),
         });
-        samples.extend(run.seconds.iter().enumerate().map(|(round, &seconds)| SampleRow {
-            case: case.name.clone(),
-            engine: engine.clone(),
-            round,
-            seconds,
-        }));
+        samples.extend(
+            run.seconds
+                .iter()
+                .enumerate()
+                .map(|(round, &seconds)| SampleRow {
+                    case: case.name.clone(),
+                    engine: engine.clone(),
+                    round,
+                    seconds,
+                }),
+        );
     }
     (timing, samples)
 }

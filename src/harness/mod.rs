@@ -4,12 +4,14 @@
 pub mod case;
 pub mod compare;
 pub mod engine;
+pub mod figures;
 pub mod inject;
 pub mod judge;
 pub mod measure;
 pub mod peers;
 pub mod record;
 pub mod registry;
+pub mod session;
 pub mod stats;
 pub mod tolerance;
 pub mod verify;

@@ -41,7 +41,9 @@ struct Registry {
 #[derive(Debug, Error)]
 pub enum RegistryError {
     /// The file cannot be read.
-    #[error("{path}: {source}; set MESHSEQ_HOME to a checkout of meshseq, which has oracles/oracles.toml")]
+    #[error(
+        "{path}: {source}; set MESHSEQ_HOME to a checkout of meshseq, which has oracles/oracles.toml"
+    )]
     File {
         path: PathBuf,
         source: std::io::Error,

@@ -118,11 +118,15 @@ tolerances! {
 
 /// Our own second-order method must reach a vanishing gradient.
 const RUST_GRADIENT: f64 = 1e-12;
-/// Engines that hold f32 somewhere.
-const SINGLE: [(&str, &str); 3] = [
-    ("openmesh", "OpenMesh parses OBJ coordinates as f32"),
-    ("tobj", "tobj holds f32"),
-    ("pymeshlab", "MeshLab measures distances in f32"),
+/// Engines that hold f32 somewhere, and what that allows: some units of its rounding, 1.2e-7.
+const SINGLE: [(&str, f64, &str); 3] = [
+    ("openmesh", 1e-6, "OpenMesh parses OBJ coordinates as f32"),
+    ("tobj", 1e-6, "tobj holds f32"),
+    (
+        "pymeshlab",
+        4e-6,
+        "MeshLab measures distances, and sums them, in f32",
+    ),
 ];
 
 /// The tolerance of a quantity, none where it is only reported.
@@ -136,11 +140,12 @@ pub fn find(stage: &str, quantity: &str, engine: &str) -> Option<Tolerance> {
     let entry = TOLERANCES
         .iter()
         .find(|e| e.stage == stage && e.quantity == quantity)?;
-    let single = SINGLE.iter().find(|(name, _)| *name == engine);
-    let touched = stage.starts_with("sequence.") && quantity.ends_with("_difference");
+    let single = SINGLE.iter().find(|(name, ..)| *name == engine);
+    let measured = quantity.ends_with("_difference") || quantity == "brute_force";
+    let touched = stage.starts_with("sequence.") && measured;
     match single {
-        Some((_, reason)) if touched && entry.value > 0.0 => Some(Tolerance {
-            value: entry.value.max(1e-6),
+        Some((_, value, reason)) if touched && entry.value > 0.0 => Some(Tolerance {
+            value: *value,
             reason: (*reason).into(),
         }),
         _ => Some(Tolerance {

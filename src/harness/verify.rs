@@ -100,7 +100,21 @@ fn measured(
     Ok(found)
 }
 
-fn row(case: &Case, engine: &str, version: String, verdict: Verdict, message: String) -> AgreementRow {
+/// A case whose inputs cannot be made.
+pub fn refused(case: &Case, message: String) -> Judged {
+    Judged {
+        row: row(case, "rust", String::new(), Verdict::Error, message),
+        quantities: Vec::new(),
+    }
+}
+
+fn row(
+    case: &Case,
+    engine: &str,
+    version: String,
+    verdict: Verdict,
+    message: String,
+) -> AgreementRow {
     AgreementRow {
         case: case.name.clone(),
         stage: case.stage.into(),
@@ -129,7 +143,11 @@ impl Held {
         match &self.tolerance {
             None => 0.0,
             Some(t) if self.value <= t.value => {
-                if t.value > 0.0 { self.value / t.value } else { 0.0 }
+                if t.value > 0.0 {
+                    self.value / t.value
+                } else {
+                    0.0
+                }
             }
             Some(t) if t.value > 0.0 && self.value.is_finite() => self.value / t.value,
             Some(_) => f64::INFINITY,
@@ -137,7 +155,13 @@ impl Held {
     }
 }
 
-fn settle(case: &Case, engine: &str, version: String, measured: Vec<Measured>, compared: bool) -> Judged {
+fn settle(
+    case: &Case,
+    engine: &str,
+    version: String,
+    measured: Vec<Measured>,
+    compared: bool,
+) -> Judged {
     let values: BTreeMap<&str, f64> = measured.iter().copied().collect();
     let mut held: Vec<Held> = measured
         .iter()
@@ -152,13 +176,17 @@ fn settle(case: &Case, engine: &str, version: String, measured: Vec<Measured>, c
         })
         .collect();
     if engine == "rust" {
-        held.extend(case.expect.iter().map(|(quantity, printed)| Held {
-            quantity: format!("{quantity} expected {}", printed.value),
-            value: values.get(quantity.as_str()).map_or(f64::NAN, |v| (v - printed.value).abs()),
-            tolerance: Some(Tolerance {
-                value: printed.half_unit * (1.0 + 1e-9),
-                reason: "half a unit of the last digit of the number on record".into(),
-            }),
+        held.extend(case.expect.iter().map(|(quantity, printed)| {
+            Held {
+                quantity: format!("{quantity} expected {}", printed.value),
+                value: values
+                    .get(quantity.as_str())
+                    .map_or(f64::NAN, |v| (v - printed.value).abs()),
+                tolerance: Some(Tolerance {
+                    value: printed.half_unit * (1.0 + 1e-9),
+                    reason: "half a unit of the last digit of the number on record".into(),
+                }),
+            }
         }));
     }
     let mut row = row(case, engine, version, Verdict::Agree, String::new());
@@ -170,7 +198,11 @@ fn settle(case: &Case, engine: &str, version: String, measured: Vec<Measured>, c
         row.quantity = Some(worst.quantity.clone());
         row.value = Some(worst.value);
         row.tolerance = worst.tolerance.as_ref().map(|t| t.value);
-        row.reason = worst.tolerance.as_ref().map(|t| t.reason.clone()).unwrap_or_default();
+        row.reason = worst
+            .tolerance
+            .as_ref()
+            .map(|t| t.reason.clone())
+            .unwrap_or_default();
         if worst.load() > 1.0 || worst.value.is_nan() {
             row.verdict = Verdict::Differ;
         }
@@ -184,7 +216,11 @@ fn settle(case: &Case, engine: &str, version: String, measured: Vec<Measured>, c
             quantity: h.quantity.clone(),
             value: h.value,
             tolerance: h.tolerance.as_ref().map(|t| t.value),
-            verdict: if h.load() > 1.0 { Verdict::Differ } else { Verdict::Agree },
+            verdict: if h.load() > 1.0 {
+                Verdict::Differ
+            } else {
+                Verdict::Agree
+            },
         })
         .collect();
     Judged { row, quantities }

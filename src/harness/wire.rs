@@ -61,7 +61,11 @@ fn write_header(out: &mut impl Write, dtype: u8, shape: &[usize]) -> io::Result<
     Ok(())
 }
 
-fn write_numbers<T: Copy>(out: &mut impl Write, data: &[T], bytes: impl Fn(T) -> [u8; 8]) -> io::Result<()> {
+fn write_numbers<T: Copy>(
+    out: &mut impl Write,
+    data: &[T],
+    bytes: impl Fn(T) -> [u8; 8],
+) -> io::Result<()> {
     for chunk in data.chunks(STEP / 8) {
         let block: Vec<u8> = chunk.iter().flat_map(|&x| bytes(x)).collect();
         out.write_all(&block)?;
@@ -78,11 +82,15 @@ pub fn read_message(stream: &mut impl Read) -> Result<Bundle, WireError> {
     }
     stream.read_exact(&mut magic[1..])?;
     if &magic != MAGIC {
-        return Err(WireError::Garbage(format!("it starts with {magic:?}, expected {MAGIC:?}")));
+        return Err(WireError::Garbage(format!(
+            "it starts with {magic:?}, expected {MAGIC:?}"
+        )));
     }
     let count = u32::from_le_bytes(read(stream)?);
     if count > MOST_RECORDS {
-        return Err(WireError::Garbage(format!("{count} records, at most {MOST_RECORDS}")));
+        return Err(WireError::Garbage(format!(
+            "{count} records, at most {MOST_RECORDS}"
+        )));
     }
     let mut bundle = Bundle::default();
     for _ in 0..count {
@@ -106,7 +114,9 @@ fn read_record(stream: &mut impl Read) -> Result<(String, Array), WireError> {
     let name = text(read_bytes(stream, length.into())?)?;
     let [dtype, rank] = read(stream)?;
     if rank > MOST_DIMENSIONS {
-        return Err(WireError::Garbage(format!("`{name}` has {rank} dimensions")));
+        return Err(WireError::Garbage(format!(
+            "`{name}` has {rank} dimensions"
+        )));
     }
     let shape = (0..rank)
         .map(|_| Ok(u64::from_le_bytes(read(stream)?)))
@@ -129,13 +139,22 @@ fn read_record(stream: &mut impl Read) -> Result<(String, Array), WireError> {
             data: numbers(&payload, i64::from_le_bytes),
         },
         3 => Array::Text(text(payload)?),
-        _ => return Err(WireError::Garbage(format!("`{name}` has the unknown dtype {dtype}"))),
+        _ => {
+            return Err(WireError::Garbage(format!(
+                "`{name}` has the unknown dtype {dtype}"
+            )));
+        }
     };
     Ok((name, array))
 }
 
 fn numbers<T>(payload: &[u8], number: impl Fn([u8; 8]) -> T) -> Vec<T> {
-    payload.as_chunks::<8>().0.iter().map(|&b| number(b)).collect()
+    payload
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|&b| number(b))
+        .collect()
 }
 
 fn text(bytes: Vec<u8>) -> Result<String, WireError> {
@@ -166,8 +185,20 @@ mod tests {
     #[test]
     fn messages_come_back_as_they_went() {
         let bundle = Bundle::from([
-            ("Z", Array::F64 { shape: vec![2, 3], data: vec![1.0, -2.0, 0.1, f64::MIN_POSITIVE, 4.0, 5.0] }),
-            ("none", Array::F64 { shape: vec![0, 3], data: vec![] }),
+            (
+                "Z",
+                Array::F64 {
+                    shape: vec![2, 3],
+                    data: vec![1.0, -2.0, 0.1, f64::MIN_POSITIVE, 4.0, 5.0],
+                },
+            ),
+            (
+                "none",
+                Array::F64 {
+                    shape: vec![0, 3],
+                    data: vec![],
+                },
+            ),
             ("k", Array::integer(7)),
             ("rule", Array::Text("literal".into())),
         ]);
@@ -178,9 +209,15 @@ mod tests {
     fn a_header_of_a_trillion_numbers_takes_no_memory() {
         let mut message = b"MSEQ\x01\0\0\0\x01\0Z\x01\x01".to_vec();
         message.extend(1_000_000_000_000u64.to_le_bytes());
-        assert!(matches!(read_message(&mut &message[..]), Err(WireError::Garbage(_))));
+        assert!(matches!(
+            read_message(&mut &message[..]),
+            Err(WireError::Garbage(_))
+        ));
         assert!(matches!(read_message(&mut &b""[..]), Err(WireError::End)));
-        assert!(matches!(read_message(&mut &b"hello world"[..]), Err(WireError::Garbage(_))));
+        assert!(matches!(
+            read_message(&mut &b"hello world"[..]),
+            Err(WireError::Garbage(_))
+        ));
     }
 
     proptest! {

@@ -1,6 +1,8 @@
 //! Deforming mesh sequences: n frames over one connectivity.
 
+pub mod dataset;
 pub mod format;
+pub mod synthetic;
 
 use std::sync::Arc;
 

@@ -18,6 +18,7 @@
 
 pub mod f;
 pub mod fidelity;
+pub mod file;
 pub mod fit;
 pub mod g;
 pub mod h;

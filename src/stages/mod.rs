@@ -3,9 +3,13 @@
 pub mod sequence;
 pub mod signal;
 
+use std::path::PathBuf;
+
+use faer::MatRef;
 use thiserror::Error;
 
-use crate::arrays::{ArrayError, Bundle};
+use crate::arrays::{Array, ArrayError, Bundle};
+use crate::sequence::Sequence;
 
 /// One step of an algorithm.
 pub struct Stage {
@@ -83,4 +87,44 @@ fn call<T: 'static>(
         arrays,
         result: None,
     }))
+}
+
+/// Inputs of a stage made from a sequence and, for `sequence.read`, the OBJ files it was read from.
+///
+/// Stages of an algorithm are fed the Rust results of the stages before them, so that errors do not pile up.
+pub fn inputs(
+    stage: &str,
+    sequence: &Sequence,
+    files: &[PathBuf],
+    choice: &signal::Choice,
+) -> Result<Bundle, StageError> {
+    let d = sequence.dimension();
+    let frames = MatRef::from_column_major_slice(sequence.positions(), d, sequence.frame_count());
+    match stage {
+        "sequence.read" => {
+            let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+            Ok(Bundle::from([("paths", Array::Text(names.join("\n")))]))
+        }
+        "sequence.distance" => {
+            let fitted = signal::at_frames(frames, choice)?;
+            let shape = vec![sequence.frame_count(), d / 3, 3];
+            let array = |data: Vec<f64>| Array::F64 {
+                shape: shape.clone(),
+                data,
+            };
+            let faces = sequence.connectivity().faces();
+            Ok(Bundle::from([
+                ("A", array(fitted)),
+                ("B", array(sequence.positions().to_vec())),
+                (
+                    "F",
+                    Array::I64 {
+                        shape: vec![faces.len(), 3],
+                        data: faces.as_flattened().iter().map(|&v| v.into()).collect(),
+                    },
+                ),
+            ]))
+        }
+        _ => signal::inputs(stage, frames, choice),
+    }
 }

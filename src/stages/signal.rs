@@ -5,13 +5,13 @@ use faer::{Mat, MatRef};
 use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::signal::f::Spline;
-use crate::signal::fit::{FitOptions, fit};
+use crate::signal::fit::{Fit, FitOptions, fit};
 use crate::signal::g::PoseSignal;
 use crate::signal::h::shape_signal;
 use crate::signal::knots::{KnotRule, knots};
 use crate::signal::mds::{Dissimilarities, scale};
-use crate::signal::parameters::centripetal;
-use crate::signal::pins::{Pin, validate_pins};
+use crate::signal::parameters::{centripetal, distinct};
+use crate::signal::pins::{Pin, principal_start, validate_pins};
 use crate::signal::psi::{Representation, TimeSignal};
 use crate::signal::rho::Rho;
 use crate::signal::sites::site_order;
@@ -140,7 +140,10 @@ fn rbf(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
             Bundle::from([
                 ("g", Array::columns(pose.coefficients.as_ref())),
                 ("values", Array::columns(pose.evaluate(&frames).as_ref())),
-                ("query_values", Array::columns(pose.evaluate(&query).as_ref())),
+                (
+                    "query_values",
+                    Array::columns(pose.evaluate(&query).as_ref()),
+                ),
             ])
         },
     )
@@ -312,9 +315,22 @@ pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<B
     }
     if stage == "signal" {
         let rule = Array::Text(choice.knots.to_string());
-        return Ok(Bundle::from([("Z", z), ("k", k), ("l", l), ("m", m), ("rule", rule)]));
+        return Ok(Bundle::from([
+            ("Z", z),
+            ("k", k),
+            ("l", l),
+            ("m", m),
+            ("rule", rule),
+        ]));
     }
     Chain::new(frames, choice)?.inputs(stage)
+}
+
+/// psi(i) for every frame i of the fit: n times d numbers.
+pub fn at_frames(frames: MatRef<'_, f64>, choice: &Choice) -> Result<Vec<f64>, StageError> {
+    let fit = choice.fit(frames)?;
+    let times: Vec<f64> = (1..=frames.ncols()).map(|i| i as f64).collect();
+    Ok(fit.representation.evaluate(&times))
 }
 
 /// k, l, m, the knot rule, and how many frames are pinned where a stage has pins.
@@ -329,28 +345,34 @@ pub struct Choice {
 
 /// The reconstruction, from which the inputs of its stages are taken.
 struct Chain<'a> {
-    fit: crate::signal::fit::Fit,
+    fit: Fit,
     start: Vec<[f64; 2]>,
     choice: &'a Choice,
     times: Vec<f64>,
 }
 
-impl<'a> Chain<'a> {
-    fn new(frames: MatRef<'_, f64>, choice: &'a Choice) -> Result<Self, StageError> {
+impl Choice {
+    /// The whole reconstruction with these constants.
+    pub fn fit(&self, frames: MatRef<'_, f64>) -> Result<Fit, StageError> {
         let options = FitOptions {
-            k: choice.k,
-            l: choice.l,
-            m: choice.m,
-            knots: choice.knots,
+            k: self.k,
+            l: self.l,
+            m: self.m,
+            knots: self.knots,
             pins: Vec::new(),
         };
-        let fit = fit(frames, &options).map_err(StageError::from_error)?;
-        let n = frames.ncols();
+        fit(frames, &options).map_err(StageError::from_error)
+    }
+}
+
+impl<'a> Chain<'a> {
+    fn new(frames: MatRef<'_, f64>, choice: &'a Choice) -> Result<Self, StageError> {
+        let fit = choice.fit(frames)?;
         Ok(Self {
-            start: crate::signal::pins::principal_start(fit.coordinates.as_ref(), &[]),
+            start: principal_start(fit.coordinates.as_ref(), &[]),
+            times: between_frames(frames.ncols()),
             fit,
             choice,
-            times: between_frames(n),
         })
     }
 
@@ -374,7 +396,7 @@ impl<'a> Chain<'a> {
             }
             "signal.parameters" => Bundle::from([p()]),
             "signal.knots" => Bundle::from([
-                ("t", Array::vector(&crate::signal::parameters::distinct(&time.parameters))),
+                ("t", Array::vector(&distinct(&time.parameters))),
                 ("k", Array::integer(time.spline.control.len())),
                 ("rule", Array::Text(self.choice.knots.to_string())),
             ]),
@@ -390,7 +412,11 @@ impl<'a> Chain<'a> {
                 inputs.put("tau", Array::vector(&self.times));
                 inputs
             }
-            _ => return Err(StageError::Failed(format!("there is no stage `{stage}` in signal"))),
+            _ => {
+                return Err(StageError::Failed(format!(
+                    "there is no stage `{stage}` in signal"
+                )));
+            }
         })
     }
 
@@ -401,7 +427,10 @@ impl<'a> Chain<'a> {
         let fixed: Vec<usize> = (0..count).map(|i| i * n / count).collect();
         let mut start = self.start.clone();
         for &i in &fixed {
-            start[i] = [1.1 * self.fit.positions[i][0], 0.9 * self.fit.positions[i][1]];
+            start[i] = [
+                1.1 * self.fit.positions[i][0],
+                0.9 * self.fit.positions[i][1],
+            ];
         }
         let positions: Vec<[f64; 2]> = fixed.iter().map(|&i| start[i]).collect();
         Bundle::from([

@@ -1,7 +1,7 @@
 //! psi and the whole reconstruction: error (2) from the frames themselves.
 
 use super::scaling::after_rigid_motion;
-use super::{Measured, diagonal, error_gap, greatest, pose, shape, share, shaped, time};
+use super::{Measured, diagonal, error_gap, greatest, pose, shape, shaped, share, time};
 use crate::arrays::{ArrayError, Bundle};
 
 /// psi(t) by the formulas, as the harness reads them.
@@ -29,12 +29,22 @@ pub fn psi_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Array
     for (frame, &t) in z.chunks(d).zip(inputs.vector("tau")?) {
         worst = worst.max(greatest(frame, &psi(inputs, t)?));
     }
-    Ok(vec![("formula", share(worst, diagonal(inputs.vector("h0")?, 3)))])
+    Ok(vec![(
+        "formula",
+        share(worst, diagonal(inputs.vector("h0")?, 3)),
+    )])
 }
 
-pub fn psi_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn psi_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let difference = greatest(frames(inputs, ours)?, frames(inputs, theirs)?);
-    Ok(vec![("frame_difference", share(difference, diagonal(inputs.vector("h0")?, 3)))])
+    Ok(vec![(
+        "frame_difference",
+        share(difference, diagonal(inputs.vector("h0")?, 3)),
+    )])
 }
 
 struct Answer<'a> {
@@ -71,7 +81,10 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
         ("error_psi", a.error_psi),
         ("relative_rms", share(rms, diagonal(&given[..d], 3))),
         ("kg_percent", kg_percent(given, d, a.error_psi)),
-        ("claimed_error_psi", error_gap(a.error_psi, a.errors[3], data)),
+        (
+            "claimed_error_psi",
+            error_gap(a.error_psi, a.errors[3], data),
+        ),
     ])
 }
 
@@ -89,18 +102,37 @@ fn kg_percent(given: &[f64], d: usize, error: f64) -> f64 {
     100.0 * share(error.sqrt(), spread.sqrt())
 }
 
-pub fn against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours)?, answer(inputs, theirs)?);
     let data = shape::centred_square(inputs.columns("Z")?);
     let d = inputs.columns("Z")?.nrows();
     let size = diagonal(&inputs.f64("Z", 2)?.1[..d], 3);
     let plane = diagonal(a.p.as_flattened(), 2);
     Ok(vec![
-        ("error_h_difference", error_gap(a.errors[0], b.errors[0], data)),
-        ("error_g_difference", error_gap(a.errors[1], b.errors[1], data)),
-        ("error_f_difference", error_gap(a.errors[2], b.errors[2], data)),
-        ("error_psi_difference", error_gap(a.error_psi, b.error_psi, data)),
+        (
+            "error_h_difference",
+            error_gap(a.errors[0], b.errors[0], data),
+        ),
+        (
+            "error_g_difference",
+            error_gap(a.errors[1], b.errors[1], data),
+        ),
+        (
+            "error_f_difference",
+            error_gap(a.errors[2], b.errors[2], data),
+        ),
+        (
+            "error_psi_difference",
+            error_gap(a.error_psi, b.error_psi, data),
+        ),
         ("frame_difference", share(greatest(a.z, b.z), size)),
-        ("position_difference", share(after_rigid_motion(&a.p, &b.p), plane)),
+        (
+            "position_difference",
+            share(after_rigid_motion(&a.p, &b.p), plane),
+        ),
     ])
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Measured, greatest, share, shaped};
+use super::{Measured, greatest, shaped, share};
 use crate::arrays::{Array, ArrayError, Bundle};
 
 /// Frames in which distances are recomputed triangle by triangle, where that is cheap enough.
@@ -27,23 +27,30 @@ pub fn read_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Arra
     let n = frame_count(inputs)?;
     let counts = counts(outputs, n)?;
     let measures = shaped(outputs, "measures", &[n, 8])?;
-    let impossible = measures.chunks(8).filter(|m| {
-        m[0] < 0.0 || m[2] > m[5] || m[3] > m[6] || m[4] > m[7]
-    });
+    let impossible = measures
+        .chunks(8)
+        .filter(|m| m[0] < 0.0 || m[2] > m[5] || m[3] > m[6] || m[4] > m[7]);
     Ok(vec![
         ("vertices", counts.iter().step_by(3).sum::<i64>() as f64),
         ("impossible", impossible.count() as f64),
     ])
 }
 
-pub fn read_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn read_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let n = frame_count(inputs)?;
     let (a, b) = (counts(ours, n)?, counts(theirs, n)?);
     let wrong = a.iter().zip(&b).filter(|(a, b)| a != b).count();
     let (a, b) = (ours.f64("measures", 2)?.1, theirs.f64("measures", 2)?.1);
     let mut worst = [0.0f64; 3];
     for (a, b) in a.chunks(8).zip(b.chunks(8)) {
-        let size = (0..3).map(|x| (a[5 + x] - a[2 + x]).powi(2)).sum::<f64>().sqrt();
+        let size = (0..3)
+            .map(|x| (a[5 + x] - a[2 + x]).powi(2))
+            .sum::<f64>()
+            .sqrt();
         worst[0] = worst[0].max(share((a[0] - b[0]).abs(), size * size));
         worst[1] = worst[1].max(share((a[1] - b[1]).abs(), size.powi(3)));
         worst[2] = worst[2].max(share(greatest(&a[2..], &b[2..]), size));
@@ -80,27 +87,41 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
     let mut worst = 0.0f64;
     if shape[1] * faces.len() <= BRUTE_FORCE {
         for i in [0, shape[0] - 1] {
-            let (greatest, mean) = brute_force(&a[i * d..(i + 1) * d], &b[i * d..(i + 1) * d], &faces);
-            worst = worst.max((greatest - found.hausdorff[i]).abs()).max((mean - found.mean[i]).abs());
+            let (greatest, mean) =
+                brute_force(&a[i * d..(i + 1) * d], &b[i * d..(i + 1) * d], &faces);
+            worst = worst
+                .max((greatest - found.hausdorff[i]).abs())
+                .max((mean - found.mean[i]).abs());
         }
     }
     let order = found.mean.iter().zip(found.hausdorff).map(|(m, h)| m - h);
     Ok(vec![
         ("brute_force", share(worst, found.size)),
-        ("mean_above_greatest", share(order.fold(0.0, f64::max), found.size)),
+        (
+            "mean_above_greatest",
+            share(order.fold(0.0, f64::max), found.size),
+        ),
     ])
 }
 
-pub fn against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours)?, answer(inputs, theirs)?);
     Ok(vec![
-        ("hausdorff_difference", share(greatest(a.hausdorff, b.hausdorff), a.size)),
+        (
+            "hausdorff_difference",
+            share(greatest(a.hausdorff, b.hausdorff), a.size),
+        ),
         ("mean_difference", share(greatest(a.mean, b.mean), a.size)),
     ])
 }
 
 fn brute_force(a: &[f64], b: &[f64], faces: &[[u32; 3]]) -> (f64, f64) {
-    let point = |data: &[f64], i: usize| Vector3::new(data[3 * i], data[3 * i + 1], data[3 * i + 2]);
+    let point =
+        |data: &[f64], i: usize| Vector3::new(data[3 * i], data[3 * i + 1], data[3 * i + 2]);
     let n = a.len() / 3;
     let (mut greatest, mut sum) = (0.0f64, 0.0);
     for i in 0..n {

@@ -23,7 +23,10 @@ struct Judge {
 }
 
 fn judge(stage: &str) -> Option<Judge> {
-    let (own, against): (fn(&Bundle, &Bundle) -> _, fn(&Bundle, &Bundle, &Bundle) -> _) = match stage {
+    let (own, against): (
+        fn(&Bundle, &Bundle) -> _,
+        fn(&Bundle, &Bundle, &Bundle) -> _,
+    ) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
         "signal.h" => (shape::own, shape::against),
@@ -54,7 +57,9 @@ pub fn against(
     ours: &Bundle,
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
-    judge(stage).map_or(Ok(Vec::new()), |judge| (judge.against)(inputs, ours, theirs))
+    judge(stage).map_or(Ok(Vec::new()), |judge| {
+        (judge.against)(inputs, ours, theirs)
+    })
 }
 
 /// An error unless the f64 array has exactly this shape.
@@ -72,7 +77,10 @@ fn shaped<'a>(bundle: &'a Bundle, name: &str, shape: &[usize]) -> Result<&'a [f6
 
 /// The greatest absolute difference of two lists of the same length.
 fn greatest(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }
 
 /// value / scale, with 0 / 0 = 0.

@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatRef};
 
-use super::{Measured, diagonal, error_gap, greatest, share, shaped};
+use super::{Measured, diagonal, error_gap, greatest, shaped, share};
 use crate::arrays::{ArrayError, Bundle};
 use crate::linalg::dense::{Qr, thin_svd};
 
@@ -53,7 +53,10 @@ pub fn rbf_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Array
     let a = answer(inputs, outputs)?;
     let size = a.x.norm_max();
     let residual = &a.values - &a.x;
-    let recomputed: Vec<f64> = a.p.iter().flat_map(|&p| evaluate(a.g.as_ref(), &a.sites, p)).collect();
+    let recomputed: Vec<f64> =
+        a.p.iter()
+            .flat_map(|&p| evaluate(a.g.as_ref(), &a.sites, p))
+            .collect();
     let values = outputs.f64("values", 2)?.1;
     let reach = diagonal(a.p.as_flattened(), 2);
     Ok(vec![
@@ -91,7 +94,9 @@ fn stationarity(a: &Answer, residual: &Mat<f64>) -> f64 {
     for j in 0..space.ncols() {
         let column = space.col(j);
         for r in 0..residual.nrows() {
-            let product: f64 = (0..space.nrows()).map(|i| column[i] * residual[(r, i)]).sum();
+            let product: f64 = (0..space.nrows())
+                .map(|i| column[i] * residual[(r, i)])
+                .sum();
             worst = worst.max(share(product.abs(), column.norm_l2() * size));
         }
     }
@@ -103,7 +108,10 @@ fn space(p: &[[f64; 2]], sites: &[[f64; 2]]) -> Option<Mat<f64>> {
     let reach = diagonal(p.as_flattened(), 2);
     let reach = if reach > 0.0 { reach } else { 1.0 };
     let unit = |q: &[f64; 2]| [(q[0] - p[0][0]) / reach, (q[1] - p[0][1]) / reach];
-    let (p, s): (Vec<_>, Vec<_>) = (p.iter().map(unit).collect(), sites.iter().map(unit).collect());
+    let (p, s): (Vec<_>, Vec<_>) = (
+        p.iter().map(unit).collect(),
+        sites.iter().map(unit).collect(),
+    );
     let affine = |q: &[f64; 2]| [1.0, q[0], q[1]];
     let l = s.len();
     let side = Mat::from_fn(l, l, |j, a| if a < 3 { affine(&s[j])[a] } else { 0.0 });
@@ -112,19 +120,33 @@ fn space(p: &[[f64; 2]], sites: &[[f64; 2]]) -> Option<Mat<f64>> {
     let kernels = Mat::from_fn(p.len(), l, |i, j| phi(p[i], s[j]));
     let bent = &kernels * null;
     Some(Mat::from_fn(p.len(), bent.ncols() + 3, |i, j| {
-        if j < 3 { affine(&p[i])[j] } else { bent[(i, j - 3)] }
+        if j < 3 {
+            affine(&p[i])[j]
+        } else {
+            bent[(i, j - 3)]
+        }
     }))
 }
 
-pub fn rbf_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn rbf_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours)?, answer(inputs, theirs)?);
     let size = a.x.norm_max();
     let error = |a: &Answer| (&a.values - &a.x).squared_norm_l2();
     let between = |name| -> Result<f64, ArrayError> {
-        Ok(share(greatest(ours.f64(name, 2)?.1, theirs.f64(name, 2)?.1), size))
+        Ok(share(
+            greatest(ours.f64(name, 2)?.1, theirs.f64(name, 2)?.1),
+            size,
+        ))
     };
     Ok(vec![
-        ("error_g_difference", error_gap(error(&a), error(&b), a.x.squared_norm_l2())),
+        (
+            "error_g_difference",
+            error_gap(error(&a), error(&b), a.x.squared_norm_l2()),
+        ),
         ("value_difference", between("values")?),
         ("query_difference", between("query_values")?),
     ])
@@ -186,7 +208,9 @@ fn residual(o: &Order, sites: &[usize]) -> Option<Mat<f64>> {
 }
 
 fn norms(residual: &Mat<f64>) -> Vec<f64> {
-    (0..residual.nrows()).map(|i| residual.row(i).norm_l2()).collect()
+    (0..residual.nrows())
+        .map(|i| residual.row(i).norm_l2())
+        .collect()
 }
 
 /// The numbers of sites at which an order is recomputed from scratch.
@@ -207,7 +231,10 @@ pub fn sites_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Arr
             error = f64::INFINITY;
             continue;
         };
-        error = error.max(share((left.squared_norm_l2() - o.errors[l - 3]).abs(), data));
+        error = error.max(share(
+            (left.squared_norm_l2() - o.errors[l - 3]).abs(),
+            data,
+        ));
         greedy = greedy.max(shortfall(&norms(&left), &o.order, l, data.sqrt()));
     }
     let rising = o.errors.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
@@ -233,7 +260,9 @@ fn shortfall(norms: &[f64], order: &[usize], l: usize, data: f64) -> f64 {
 /// The first four are the farthest from the best-fit plane, by decreasing distance.
 fn start_shortfall(o: &Order) -> f64 {
     let (m, n) = o.x.shape();
-    let mean: Vec<f64> = (0..m).map(|a| (0..n).map(|i| o.x[(a, i)]).sum::<f64>() / n as f64).collect();
+    let mean: Vec<f64> = (0..m)
+        .map(|a| (0..n).map(|i| o.x[(a, i)]).sum::<f64>() / n as f64)
+        .collect();
     let centred = Mat::from_fn(n, m, |i, a| o.x[(a, i)] - mean[a]);
     let Ok(svd) = thin_svd(centred.as_ref()) else {
         return f64::INFINITY;
@@ -247,18 +276,34 @@ fn start_shortfall(o: &Order) -> f64 {
         .fold(0.0, f64::max)
 }
 
-pub fn sites_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn sites_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (order(inputs, ours)?, order(inputs, theirs)?);
     let data = a.x.squared_norm_l2();
-    let same = a.order.iter().zip(&b.order).take_while(|(a, b)| a == b).count();
-    let compared = same.saturating_sub(2).min(a.errors.len()).min(b.errors.len());
+    let same = a
+        .order
+        .iter()
+        .zip(&b.order)
+        .take_while(|(a, b)| a == b)
+        .count();
+    let compared = same
+        .saturating_sub(2)
+        .min(a.errors.len())
+        .min(b.errors.len());
     let mut gap = 0.0;
     if same < a.order.len().min(b.order.len()) && same >= 4 {
         gap = match residual(&a, &a.order[..same]) {
             Some(left) => {
                 let norms = norms(&left);
                 let (p, q) = (norms[a.order[same]], norms[b.order[same]]);
-                if p.max(q) <= 1e-9 * data.sqrt() { 0.0 } else { share((p - q).abs(), p.max(q)) }
+                if p.max(q) <= 1e-9 * data.sqrt() {
+                    0.0
+                } else {
+                    share((p - q).abs(), p.max(q))
+                }
             }
             None => f64::INFINITY,
         };
@@ -266,7 +311,13 @@ pub fn sites_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<
     // Where the first four differ, `start` of both answers has already judged them.
     Ok(vec![
         ("order_gap", gap),
-        ("errors_difference", share(greatest(&a.errors[..compared], &b.errors[..compared]), data)),
-        ("count_difference", a.order.len().abs_diff(b.order.len()) as f64),
+        (
+            "errors_difference",
+            share(greatest(&a.errors[..compared], &b.errors[..compared]), data),
+        ),
+        (
+            "count_difference",
+            a.order.len().abs_diff(b.order.len()) as f64,
+        ),
     ])
 }

@@ -2,14 +2,17 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Measured, diagonal, greatest, share, shaped};
+use super::{Measured, diagonal, greatest, shaped, share};
 use crate::arrays::{ArrayError, Bundle};
 
 /// A layout whose gradient is below this is at a stationary point, and positions may be compared.
 const STATIONARY: f64 = 1e-9;
 
 fn shape_distance(x: faer::MatRef<'_, f64>, i: usize, j: usize) -> f64 {
-    (0..x.nrows()).map(|a| (x[(a, i)] - x[(a, j)]).powi(2)).sum::<f64>().sqrt()
+    (0..x.nrows())
+        .map(|a| (x[(a, i)] - x[(a, j)]).powi(2))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// The stress, the sum of squared dissimilarities, and the greatest norm of half the stress's gradient at the points for which `free` holds.
@@ -33,7 +36,10 @@ fn stress(x: faer::MatRef<'_, f64>, p: &[[f64; 2]], free: impl Fn(usize) -> bool
         }
     }
     let norm = |i: usize| gradient[i][0].hypot(gradient[i][1]);
-    let worst = (0..p.len()).filter(|&i| free(i)).map(norm).fold(0.0, f64::max);
+    let worst = (0..p.len())
+        .filter(|&i| free(i))
+        .map(norm)
+        .fold(0.0, f64::max);
     [stress, total, worst]
 }
 
@@ -67,7 +73,10 @@ fn quantities(a: &Answer) -> Vec<Measured> {
     vec![
         ("stress", a.stress),
         ("gradient", a.gradient),
-        ("above_start", share((a.stress - a.start_stress).max(0.0), a.total)),
+        (
+            "above_start",
+            share((a.stress - a.start_stress).max(0.0), a.total),
+        ),
     ]
 }
 
@@ -93,19 +102,33 @@ fn stress_gap(a: &Answer, b: &Answer) -> f64 {
     share((a.stress - b.stress).abs(), a.stress.max(1e-6 * a.total))
 }
 
-pub fn against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours, &[])?, answer(inputs, theirs, &[])?);
     let mut found = vec![("stress_difference", stress_gap(&a, &b))];
     if a.gradient.max(b.gradient) <= STATIONARY {
         let size = diagonal(a.p.as_flattened(), 2);
-        found.push(("position_difference", share(after_rigid_motion(&a.p, &b.p), size)));
+        found.push((
+            "position_difference",
+            share(after_rigid_motion(&a.p, &b.p), size),
+        ));
     }
     Ok(found)
 }
 
-pub fn fixed_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn fixed_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let fixed = inputs.indices("fixed")?;
-    let (a, b) = (answer(inputs, ours, &fixed)?, answer(inputs, theirs, &fixed)?);
+    let (a, b) = (
+        answer(inputs, ours, &fixed)?,
+        answer(inputs, theirs, &fixed)?,
+    );
     let mut found = vec![("stress_difference", stress_gap(&a, &b))];
     if a.gradient.max(b.gradient) <= STATIONARY {
         let difference = greatest(a.p.as_flattened(), b.p.as_flattened());
@@ -141,7 +164,9 @@ mod tests {
 
     #[test]
     fn rigid_motions_do_not_count_and_scale_does() {
-        let p: Vec<[f64; 2]> = (0..7).map(|i| [(i as f64).sin(), (2.0 * i as f64).cos()]).collect();
+        let p: Vec<[f64; 2]> = (0..7)
+            .map(|i| [(i as f64).sin(), (2.0 * i as f64).cos()])
+            .collect();
         let q: Vec<[f64; 2]> = p.iter().map(|p| [3.0 - p[1], p[0] - 1.0]).collect();
         let mirrored: Vec<[f64; 2]> = p.iter().map(|p| [-p[0], p[1]]).collect();
         let larger: Vec<[f64; 2]> = p.iter().map(|p| [1.01 * p[0], 1.01 * p[1]]).collect();

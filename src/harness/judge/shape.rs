@@ -3,7 +3,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 
-use super::{Measured, error_gap, greatest, share, shaped, square};
+use super::{Measured, error_gap, greatest, shaped, share, square};
 use crate::arrays::{ArrayError, Bundle};
 
 /// Neighbouring singular values closer than this share of the first leave their directions free to turn among themselves.
@@ -47,10 +47,24 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
     Ok(vec![
         ("error_h", error_h(&a)),
         ("mean", share(greatest(&mean, outputs.vector("h0")?), size)),
-        ("orthonormality", (a.h.transpose() * &a.h - identity).norm_max()),
-        ("projection", share((&a.x - a.h.transpose() * &a.centred).norm_max(), size)),
-        ("sign", (0..m).filter(|&j| points_backwards(a.h.col_as_slice(j))).count() as f64),
-        ("too_many_dimensions", m.saturating_sub(inputs.integer("m")?) as f64),
+        (
+            "orthonormality",
+            (a.h.transpose() * &a.h - identity).norm_max(),
+        ),
+        (
+            "projection",
+            share((&a.x - a.h.transpose() * &a.centred).norm_max(), size),
+        ),
+        (
+            "sign",
+            (0..m)
+                .filter(|&j| points_backwards(a.h.col_as_slice(j)))
+                .count() as f64,
+        ),
+        (
+            "too_many_dimensions",
+            m.saturating_sub(inputs.integer("m")?) as f64,
+        ),
     ])
 }
 
@@ -61,18 +75,28 @@ fn points_backwards(direction: &[f64]) -> bool {
     -low > high * (1.0 + 1e-9)
 }
 
-pub fn against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours)?, answer(inputs, theirs)?);
     let data = a.centred.squared_norm_l2();
     let (m, other) = (a.h.ncols(), b.h.ncols());
     let mut found = vec![
-        ("error_h_difference", error_gap(error_h(&a), error_h(&b), data)),
+        (
+            "error_h_difference",
+            error_gap(error_h(&a), error_h(&b), data),
+        ),
         ("dimension_difference", m.abs_diff(other) as f64),
     ];
     if m == other {
         let (s, t) = (ours.vector("sigma")?, theirs.vector("sigma")?);
         found.push(("sigma_difference", share(greatest(s, t), data.sqrt())));
-        found.push(("coordinate_difference", coordinate_difference(&a, &b, s) / data.sqrt().max(f64::MIN_POSITIVE)));
+        found.push((
+            "coordinate_difference",
+            coordinate_difference(&a, &b, s) / data.sqrt().max(f64::MIN_POSITIVE),
+        ));
     }
     Ok(found)
 }
@@ -88,7 +112,8 @@ fn coordinate_difference(a: &Answer, b: &Answer, sigma: &[f64]) -> f64 {
         while end < sigma.len() && sigma[end - 1] - sigma[end] < EQUAL * first {
             end += 1;
         }
-        let rows = |x: &Mat<f64>| DMatrix::from_fn(end - start, x.ncols(), |r, i| x[(start + r, i)]);
+        let rows =
+            |x: &Mat<f64>| DMatrix::from_fn(end - start, x.ncols(), |r, i| x[(start + r, i)]);
         let (p, q) = (rows(&a.x), rows(&b.x));
         let svd = (&p * q.transpose()).svd(true, true);
         if let (Some(u), Some(v)) = (svd.u, svd.v_t) {

@@ -1,22 +1,37 @@
 //! The time signal: parameters, knots, spline and rho, each by its definition.
 
-use super::{Measured, diagonal, error_gap, greatest, share, shaped, square};
+use super::{Measured, diagonal, error_gap, greatest, shaped, share, square};
 use crate::arrays::{ArrayError, Bundle};
 
 pub fn parameters_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let p = inputs.points("P")?;
     let t = shaped(outputs, "t", &[p.len()])?;
-    let steps = p.windows(2).map(|w| (w[0][0] - w[1][0]).hypot(w[0][1] - w[1][1]));
-    let missed = t.windows(2).zip(steps).map(|(w, step)| ((w[1] - w[0]).powi(2) - step).abs());
+    let steps = p
+        .windows(2)
+        .map(|w| (w[0][0] - w[1][0]).hypot(w[0][1] - w[1][1]));
+    let missed = t
+        .windows(2)
+        .zip(steps)
+        .map(|(w, step)| ((w[1] - w[0]).powi(2) - step).abs());
     Ok(vec![
         ("first", t.first().map_or(0.0, |t| t.abs())),
-        ("steps", share(missed.fold(0.0, f64::max), diagonal(p.as_flattened(), 2))),
+        (
+            "steps",
+            share(missed.fold(0.0, f64::max), diagonal(p.as_flattened(), 2)),
+        ),
     ])
 }
 
-pub fn parameters_against(_: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn parameters_against(
+    _: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (ours.vector("t")?, theirs.vector("t")?);
-    Ok(vec![("t_difference", share(greatest(a, b), a.last().copied().unwrap_or(0.0)))])
+    Ok(vec![(
+        "t_difference",
+        share(greatest(a, b), a.last().copied().unwrap_or(0.0)),
+    )])
 }
 
 pub fn knots_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
@@ -55,9 +70,16 @@ fn averages(t: &[f64], u: &[f64], k: usize, symmetric: bool) -> f64 {
         .fold(0.0, f64::max)
 }
 
-pub fn knots_against(_: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn knots_against(
+    _: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (ours.vector("u")?, theirs.vector("u")?);
-    Ok(vec![("u_difference", share(greatest(a, b), a.last().copied().unwrap_or(0.0)))])
+    Ok(vec![(
+        "u_difference",
+        share(greatest(a, b), a.last().copied().unwrap_or(0.0)),
+    )])
 }
 
 /// B_j(u) for j = 0..k by the recursion of Cox & de Boor, in its definition's form: slow and plain. `full` are the k + 4 knots.
@@ -65,19 +87,35 @@ fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
     if degree == 0 {
         let last = full[full.len() - 1];
         let closes = u == last && full[j] < last && full[j + 1] == last;
-        return if (full[j] <= u && u < full[j + 1]) || closes { 1.0 } else { 0.0 };
+        return if (full[j] <= u && u < full[j + 1]) || closes {
+            1.0
+        } else {
+            0.0
+        };
     }
     let part = |from: usize, weight: f64, of: f64| {
-        if of > 0.0 { weight / of * basis(full, from, degree - 1, u) } else { 0.0 }
+        if of > 0.0 {
+            weight / of * basis(full, from, degree - 1, u)
+        } else {
+            0.0
+        }
     };
     part(j, u - full[j], full[j + degree] - full[j])
-        + part(j + 1, full[j + degree + 1] - u, full[j + degree + 1] - full[j + 1])
+        + part(
+            j + 1,
+            full[j + degree + 1] - u,
+            full[j + degree + 1] - full[j + 1],
+        )
 }
 
 /// One more copy of each end knot.
 fn full(u: &[f64]) -> Vec<f64> {
     let ends = (u.first().copied(), u.last().copied());
-    ends.0.into_iter().chain(u.iter().copied()).chain(ends.1).collect()
+    ends.0
+        .into_iter()
+        .chain(u.iter().copied())
+        .chain(ends.1)
+        .collect()
 }
 
 /// f~(u) by the definition.
@@ -102,7 +140,11 @@ struct Spline<'a> {
 }
 
 fn spline<'a>(inputs: &'a Bundle, outputs: &Bundle) -> Result<Spline<'a>, ArrayError> {
-    let (t, u, p) = (inputs.vector("t")?, inputs.vector("u")?, inputs.points("P")?);
+    let (t, u, p) = (
+        inputs.vector("t")?,
+        inputs.vector("u")?,
+        inputs.points("P")?,
+    );
     shaped(outputs, "control", &[u.len() - 2, 2])?;
     shaped(outputs, "values", &[t.len(), 2])?;
     shaped(outputs, "query_values", &[inputs.vector("query")?.len(), 2])?;
@@ -117,13 +159,22 @@ fn spline<'a>(inputs: &'a Bundle, outputs: &Bundle) -> Result<Spline<'a>, ArrayE
 }
 
 fn error_f(s: &Spline) -> f64 {
-    let left: Vec<f64> = s.values.as_flattened().iter().zip(s.p.as_flattened()).map(|(a, b)| a - b).collect();
+    let left: Vec<f64> = s
+        .values
+        .as_flattened()
+        .iter()
+        .zip(s.p.as_flattened())
+        .map(|(a, b)| a - b)
+        .collect();
     square(&left)
 }
 
 pub fn spline_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let s = spline(inputs, outputs)?;
-    let formula = s.t.iter().zip(&s.values).map(|(&t, v)| greatest(&curve(s.u, &s.control, t), v));
+    let formula =
+        s.t.iter()
+            .zip(&s.values)
+            .map(|(&t, v)| greatest(&curve(s.u, &s.control, t), v));
     Ok(vec![
         ("error_f", error_f(&s)),
         ("formula", share(formula.fold(0.0, f64::max), s.size)),
@@ -148,7 +199,11 @@ fn stationarity(s: &Spline) -> f64 {
     worst
 }
 
-pub fn spline_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn spline_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (spline(inputs, ours)?, spline(inputs, theirs)?);
     let data = a.p.len() as f64 * a.size * a.size;
     let query = greatest(
@@ -156,8 +211,17 @@ pub fn spline_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result
         theirs.points("query_values")?.as_flattened(),
     );
     Ok(vec![
-        ("error_f_difference", error_gap(error_f(&a), error_f(&b), data)),
-        ("value_difference", share(greatest(a.values.as_flattened(), b.values.as_flattened()), a.size)),
+        (
+            "error_f_difference",
+            error_gap(error_f(&a), error_f(&b), data),
+        ),
+        (
+            "value_difference",
+            share(
+                greatest(a.values.as_flattened(), b.values.as_flattened()),
+                a.size,
+            ),
+        ),
         ("query_difference", share(query, a.size)),
     ])
 }
@@ -219,14 +283,24 @@ pub fn rho_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Array
 fn falling(query: &[f64], values: &[f64]) -> f64 {
     let mut pairs: Vec<(f64, f64)> = query.iter().copied().zip(values.iter().copied()).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    pairs.windows(2).map(|w| w[0].1 - w[1].1).fold(0.0, f64::max)
+    pairs
+        .windows(2)
+        .map(|w| w[0].1 - w[1].1)
+        .fold(0.0, f64::max)
 }
 
-pub fn rho_against(inputs: &Bundle, ours: &Bundle, theirs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+pub fn rho_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
     let t = inputs.vector("t")?;
     let length = t[t.len() - 1] - t[0];
     let between = |name| -> Result<f64, ArrayError> {
-        Ok(share(greatest(ours.vector(name)?, theirs.vector(name)?), length))
+        Ok(share(
+            greatest(ours.vector(name)?, theirs.vector(name)?),
+            length,
+        ))
     };
     Ok(vec![
         ("value_difference", between("values")?),

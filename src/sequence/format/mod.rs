@@ -18,7 +18,7 @@ mod obj;
 mod pc2;
 pub mod peer_tobj;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Sequence;
 pub use error::FormatError;
@@ -41,6 +41,11 @@ pub fn read(path: &Path) -> Result<Sequence, FormatError> {
         }
     }
     obj::read(&frame_files(path)?)
+}
+
+/// Reads OBJ files as the frames of one sequence, in this order.
+pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
+    obj::read(paths)
 }
 
 /// Writes `sequence` to `path`, in the format its ending names: `.npz` and OBJ keep every bit, `.pc2` rounds to f32.

@@ -16,21 +16,11 @@ use std::sync::Arc;
 
 use super::bytes;
 use super::error::FormatError;
+use crate::arrays::Array;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
 pub use archive::Archive;
 pub use problem::NpzProblem;
-
-/// An array as it stands in an NPZ file. The product of `shape` is the length of `data`, which is row-major.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Array {
-    /// Doubles, numpy's `<f8`.
-    F64 { shape: Vec<usize>, data: Vec<f64> },
-    /// Integers, numpy's `<i8`.
-    I64 { shape: Vec<usize>, data: Vec<i64> },
-    /// A text, numpy's string scalar `<U..` of shape (); it must not end in NUL, which numpy takes for padding.
-    Text(String),
-}
 
 /// An [`Array`] that is only looked at, to be written without a copy.
 #[derive(Clone, Copy, Debug)]
@@ -43,22 +33,12 @@ pub enum ArrayView<'a> {
     Text(&'a str),
 }
 
-impl Array {
-    /// The same array, to look at.
-    pub fn view(&self) -> ArrayView<'_> {
-        match self {
-            Self::F64 { shape, data } => ArrayView::F64 { shape, data },
-            Self::I64 { shape, data } => ArrayView::I64 { shape, data },
-            Self::Text(text) => ArrayView::Text(text),
-        }
-    }
-
-    /// What this is, for a message: `f64 of shape [2, 3]`.
-    fn describe(&self) -> String {
-        match self {
-            Self::F64 { shape, .. } => format!("floats of shape {shape:?}"),
-            Self::I64 { shape, .. } => format!("integers of shape {shape:?}"),
-            Self::Text(_) => "a text".into(),
+impl<'a> From<&'a Array> for ArrayView<'a> {
+    fn from(array: &'a Array) -> Self {
+        match array {
+            Array::F64 { shape, data } => Self::F64 { shape, data },
+            Array::I64 { shape, data } => Self::I64 { shape, data },
+            Array::Text(text) => Self::Text(text),
         }
     }
 }
@@ -89,7 +69,7 @@ pub fn read_arrays(path: &Path) -> Result<Vec<(String, Array)>, FormatError> {
 pub fn write_arrays(path: &Path, arrays: &[(&str, Array)]) -> Result<(), FormatError> {
     let views: Vec<_> = arrays
         .iter()
-        .map(|(name, array)| (*name, array.view()))
+        .map(|(name, array)| (*name, array.into()))
         .collect();
     write_views(path, &views)
 }

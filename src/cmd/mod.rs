@@ -1,0 +1,143 @@
+//! The command line, one file a verb. Exit codes: 0 done, 1 checks differ, 2 bad usage or bad input.
+
+mod compare;
+mod convert;
+mod data;
+mod doctor;
+mod info;
+mod list;
+mod output;
+mod report;
+mod run;
+mod signal;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Anything that ends a verb with exit code 2.
+type Failure = Box<dyn std::error::Error>;
+/// Whether all checks held.
+type Outcome = Result<bool, Failure>;
+
+#[derive(Parser)]
+#[command(name = "meshseq", version, about, max_term_width = 110)]
+struct Cli {
+    /// Threads to compute with; all cores if not given. Results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Run cases on every engine and judge the answers; write a record and an HTML report
+    #[command(after_help = "Example: meshseq verify signal/h --engine numpy")]
+    Verify(run::Verify),
+    /// Verify cases, then time every engine that agrees
+    #[command(after_help = "Example: meshseq measure signal/h/gallop-small")]
+    Measure(run::Measure),
+    /// Two records side by side: what got worse, what got better
+    #[command(
+        after_help = "Example: meshseq compare results/2026-11-22.1 target/meshseq/2026-11-23.1"
+    )]
+    Compare(compare::Compare),
+    /// Make a record's HTML report again, or put its table into a README
+    #[command(after_help = "Example: meshseq report results/2026-11-22.1")]
+    Report(report::Report),
+    /// Cases, stages, engines or faults
+    #[command(after_help = "Example: meshseq list signal")]
+    List(list::List),
+    /// What is installed, and how to get what is missing
+    Doctor,
+    /// Embedded sequences, and real data where it lies
+    #[command(after_help = "Example: meshseq data --data ~/meshes")]
+    Data(data::Data),
+    /// What a sequence is: counts, measures, defects
+    #[command(after_help = "Example: meshseq info @gallop-small --json info.json")]
+    Info(info::Info),
+    /// A sequence in another format
+    #[command(after_help = "Example: meshseq convert @gallop-small gallop.npz")]
+    Convert(convert::Convert),
+    /// Cashman & Hormann 2012: time, pose and shape signals
+    #[command(subcommand)]
+    Signal(signal::Signal),
+}
+
+/// Frames of a sequence.
+#[derive(Args, Clone)]
+struct FrameChoice {
+    /// Frames to take, 1-based, both ends in, such as 1..24
+    #[arg(long, value_name = "A..B", default_value = "..")]
+    frames: String,
+    /// Take every S-th of them
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    every: usize,
+}
+
+impl FrameChoice {
+    fn open(&self, argument: &str) -> Result<crate::sequence::Sequence, Failure> {
+        let sequence = crate::sequence::dataset::open(argument)?;
+        if self.frames == ".." && self.every == 1 {
+            return Ok(sequence);
+        }
+        let mut frames: crate::harness::case::Frames = self.frames.parse()?;
+        if self.every == 0 {
+            return Err("--every 0: expected at least 1".into());
+        }
+        frames.step = self.every;
+        let indices = frames.indices(sequence.frame_count())?;
+        Ok(sequence.select(&indices)?)
+    }
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    if let Some(threads) = cli.threads {
+        if threads == 0 {
+            eprintln!("meshseq: --threads 0: expected at least 1");
+            return ExitCode::from(2);
+        }
+        // A pool that stands already is the only failure, and then its size stands too.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global();
+    }
+    let outcome = match cli.verb {
+        Verb::Verify(verb) => verb.run(),
+        Verb::Measure(verb) => verb.run(),
+        Verb::Compare(verb) => verb.run(),
+        Verb::Report(verb) => verb.run(),
+        Verb::List(verb) => verb.run(),
+        Verb::Doctor => doctor::run(),
+        Verb::Data(verb) => verb.run(),
+        Verb::Info(verb) => verb.run(),
+        Verb::Convert(verb) => verb.run(),
+        Verb::Signal(verb) => verb.run(),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(failure) => {
+            eprintln!("meshseq: {failure}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The checkout with `oracles/` and `bench/`: `MESHSEQ_HOME`, a folder above this one, or where this program was built.
+fn home() -> PathBuf {
+    let holds = |folder: &std::path::Path| folder.join("oracles/oracles.toml").is_file();
+    if let Some(named) = std::env::var_os("MESHSEQ_HOME") {
+        return named.into();
+    }
+    let here = std::env::current_dir().unwrap_or_default();
+    let above = here.ancestors().find(|folder| holds(folder));
+    above.map_or_else(
+        || env!("CARGO_MANIFEST_DIR").into(),
+        std::path::Path::to_owned,
+    )
+}

@@ -1,0 +1,275 @@
+//! `signal fit` and `signal sample`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use faer::MatRef;
+use serde_json::json;
+
+use super::output::{say, write_json};
+use super::{Failure, FrameChoice, Outcome};
+use crate::mesh::measure::bounds;
+use crate::sequence::Sequence;
+use crate::sequence::format::write;
+use crate::signal::fidelity::fit_to_error;
+use crate::signal::file::{Stored, load, save};
+use crate::signal::fit::{Fit, FitOptions, fit};
+use crate::signal::knots::KnotRule;
+use crate::signal::pins::Pin;
+
+#[derive(Subcommand)]
+pub enum Signal {
+    /// Fit time, pose and shape signals to a sequence
+    #[command(
+        after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 -o gallop.npz --json fit.json"
+    )]
+    Fit(FitVerb),
+    /// Frames of a representation at any times
+    #[command(after_help = "Example: meshseq signal sample gallop.npz --count 48 -o twice-as-many")]
+    Sample(SampleVerb),
+}
+
+impl Signal {
+    pub fn run(self) -> Outcome {
+        match self {
+            Self::Fit(verb) => verb.run(),
+            Self::Sample(verb) => verb.run(),
+        }
+    }
+}
+
+#[derive(Args)]
+pub struct FitVerb {
+    /// A folder or pattern of OBJ frames, an .npz, a .pc2, or @name
+    sequence: String,
+    #[command(flatten)]
+    frames: FrameChoice,
+    /// Control points of the time signal, 4 to n + 2
+    #[arg(long, requires_all = ["l", "m"])]
+    k: Option<usize>,
+    /// Sites of the pose signal, 3 to n
+    #[arg(long, requires_all = ["k", "m"])]
+    l: Option<usize>,
+    /// Dimension of the shape subspace, 0 to n - 1
+    #[arg(long, requires_all = ["k", "l"])]
+    m: Option<usize>,
+    /// Choose k, l, m for this relative RMS error, such as 0.01
+    #[arg(long, value_name = "R", conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
+    tolerance: Option<f64>,
+    /// How knots average parameters: literal as printed in the paper's source, or symmetric
+    #[arg(long, default_value = "literal", value_name = "RULE")]
+    knots: String,
+    /// CSV of pinned frames: frame (1-based), x, y; with a header line
+    #[arg(long, value_name = "FILE")]
+    pins: Option<PathBuf>,
+    /// Write the representation to this .npz
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the numbers to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl FitVerb {
+    pub fn run(self) -> Outcome {
+        let knots: KnotRule = self
+            .knots
+            .parse()
+            .map_err(|e| format!("{e}, found `{}`", self.knots))?;
+        if let Some(out) = self
+            .out
+            .as_ref()
+            .filter(|out| out.extension().is_none_or(|e| e != "npz"))
+        {
+            return Err(format!(
+                "{}: a representation is one .npz file; name it so",
+                out.display()
+            )
+            .into());
+        }
+        let sequence = self.frames.open(&self.sequence)?;
+        let pins = self.pins.as_ref().map_or(Ok(Vec::new()), read_pins)?;
+        let d = sequence.dimension();
+        let frames =
+            MatRef::from_column_major_slice(sequence.positions(), d, sequence.frame_count());
+        let fitted = match (self.tolerance, self.k, self.l, self.m) {
+            (None, Some(k), Some(l), Some(m)) => fit(
+                frames,
+                &FitOptions {
+                    k,
+                    l,
+                    m,
+                    knots,
+                    pins,
+                },
+            )?,
+            (tolerance, ..) => {
+                let most = allowed_error(&sequence, tolerance.unwrap_or(f64::NAN));
+                fit_to_error(frames, most, knots, &pins)?
+            }
+        };
+        let numbers = numbers(&sequence, &fitted, knots);
+        say(&describe(&self.sequence, &numbers));
+        if let Some(out) = &self.out {
+            let stored = Stored {
+                representation: fitted.representation,
+                positions: fitted.positions,
+                connectivity: sequence.connectivity().clone(),
+            };
+            save(&stored, out)?;
+        }
+        if let Some(path) = &self.json {
+            write_json(path, &numbers)?;
+        }
+        Ok(true)
+    }
+}
+
+/// The error (2) at which the relative RMS is `relative`.
+fn allowed_error(sequence: &Sequence, relative: f64) -> f64 {
+    let size = bounds(sequence.frame(0)).diagonal();
+    let vertices = sequence.frame_count() * sequence.connectivity().vertex_count();
+    if relative > 0.0 {
+        (relative * size).powi(2) * vertices as f64
+    } else {
+        relative
+    }
+}
+
+/// Everything that `--json` holds.
+fn numbers(sequence: &Sequence, fit: &Fit, knots: KnotRule) -> serde_json::Value {
+    let (k, l, m) = fit.klm();
+    let (n, vertices) = (
+        sequence.frame_count(),
+        sequence.connectivity().vertex_count(),
+    );
+    let rms = (fit.errors.psi / (n * vertices) as f64).sqrt();
+    let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+    let t = fit.timings;
+    json!({
+        "n": n, "d": sequence.dimension(), "k": k, "l": l, "m": m,
+        "V": vertices, "F": sequence.connectivity().faces().len(),
+        "space": "vertex", "knots": knots.to_string(),
+        "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
+        "relative_rms": ratio(rms, bounds(sequence.frame(0)).diagonal()),
+        "kg_percent": 100.0 * ratio(fit.errors.psi.sqrt(), spread(sequence)),
+        "stored_numbers": fit.representation.stored_numbers(),
+        "same_pose": fit.same_pose,
+        "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
+        "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
+    })
+}
+
+fn ratio(value: f64, scale: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value / scale }
+}
+
+/// ||A - E(A)|| of Karni & Gotsman 2004: E(A) puts every vertex at the mean vertex of its frame.
+fn spread(sequence: &Sequence) -> f64 {
+    let frame_spread = |frame: &[f64]| -> f64 {
+        (0..3)
+            .map(|axis| {
+                let values = || frame.iter().skip(axis).step_by(3);
+                let mean = values().sum::<f64>() / (frame.len() / 3) as f64;
+                values().map(|x| (x - mean).powi(2)).sum::<f64>()
+            })
+            .sum()
+    };
+    let frames = sequence.positions().chunks(sequence.dimension());
+    frames.map(frame_spread).sum::<f64>().sqrt()
+}
+
+fn describe(name: &str, v: &serde_json::Value) -> String {
+    let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
+    let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
+    format!(
+        "{name}: n = {}, k = {}, l = {}, m = {}, {} knots\n\
+         errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
+         relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
+         ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
+        v["n"],
+        v["k"],
+        v["l"],
+        v["m"],
+        v["knots"].as_str().unwrap_or(""),
+        number("error_h"),
+        number("error_g"),
+        number("error_f"),
+        number("error_psi"),
+        100.0 * number("relative_rms"),
+        number("kg_percent"),
+        v["stored_numbers"],
+        v["n"].as_u64().unwrap_or(0) * v["d"].as_u64().unwrap_or(0),
+        t("h"),
+        t("mds"),
+        t("rbf"),
+        t("g"),
+        t("f"),
+    )
+}
+
+/// Rows `frame,x,y` with 1-based frames.
+fn read_pins(path: &PathBuf) -> Result<Vec<Pin>, Failure> {
+    let place = path.display();
+    let mut reader = csv::Reader::from_path(path).map_err(|e| format!("{place}: {e}"))?;
+    let mut pins = Vec::new();
+    for row in reader.deserialize() {
+        let (frame, x, y): (usize, f64, f64) =
+            row.map_err(|e| format!("{place}: {e}; expected the columns frame, x, y"))?;
+        let frame = frame
+            .checked_sub(1)
+            .ok_or_else(|| format!("{place}: frames are counted from 1, found 0"))?;
+        pins.push(Pin {
+            frame,
+            position: [x, y],
+        });
+    }
+    Ok(pins)
+}
+
+#[derive(Args)]
+pub struct SampleVerb {
+    /// A representation that `signal fit` wrote
+    representation: PathBuf,
+    /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
+    #[arg(long, value_name = "N", conflicts_with = "times")]
+    count: Option<usize>,
+    /// Frame times in [1, n], separated by commas
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',')]
+    times: Vec<f64>,
+    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    #[arg(short, long, value_name = "OUT")]
+    out: PathBuf,
+}
+
+impl SampleVerb {
+    pub fn run(self) -> Outcome {
+        let stored = load(&self.representation)?;
+        let n = stored.representation.time.frame_count() as f64;
+        let times = self.frame_times(n)?;
+        let frames = stored.representation.evaluate(&times);
+        let sequence = Sequence::new(stored.connectivity, times.len(), frames)?;
+        write(&sequence, &self.out)?;
+        say(&format!("{}: {} frames", self.out.display(), times.len()));
+        Ok(true)
+    }
+
+    fn frame_times(&self, n: f64) -> Result<Vec<f64>, Failure> {
+        if let Some(t) = self.times.iter().find(|t| !(1.0..=n).contains(*t)) {
+            return Err(format!("time {t}, expected frame times in [1, {n}]").into());
+        }
+        if !self.times.is_empty() {
+            return Ok(self.times.clone());
+        }
+        let count = self.count.unwrap_or(n as usize);
+        if count == 0 || count > 10_000_000 {
+            return Err(format!("--count {count}, expected 1 to 10000000").into());
+        }
+        let step = if count > 1 {
+            (n - 1.0) / (count - 1) as f64
+        } else {
+            0.0
+        };
+        Ok((0..count).map(|i| (1.0 + i as f64 * step).min(n)).collect())
+    }
+}
