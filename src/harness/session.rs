@@ -46,10 +46,16 @@ pub enum SessionError {
     Scratch(#[from] std::io::Error),
     /// A case whose dataset cannot be had.
     #[error("case {case}: {source}")]
-    Dataset { case: String, source: DatasetError },
+    Dataset {
+        case: String,
+        source: Box<DatasetError>,
+    },
     /// A case whose dataset cannot be written for readers to read.
     #[error("case {case}: {source}")]
-    Format { case: String, source: FormatError },
+    Format {
+        case: String,
+        source: Box<FormatError>,
+    },
     /// A case that asks for frames or constants that its dataset has not got.
     #[error("case {case}: {what}")]
     Inputs { case: String, what: String },
@@ -143,10 +149,9 @@ impl Session {
         for case in cases {
             match self.run_case(case, &mut record) {
                 Ok(judged) => tell(Event::Judged(case, &judged)),
-                Err(SessionError::Dataset {
-                    source: source @ DatasetError::Absent { .. },
-                    ..
-                }) => {
+                Err(SessionError::Dataset { source, .. })
+                    if matches!(*source, DatasetError::Absent { .. }) =>
+                {
                     let why = source.to_string();
                     record.skipped.push(format!("{}: {why}", case.name));
                     tell(Event::Skipped(case, &why));
@@ -223,7 +228,7 @@ impl Session {
             .sequence(&case.dataset)
             .map_err(|source| SessionError::Dataset {
                 case: case.name.clone(),
-                source,
+                source: Box::new(source),
             })?;
         self.last = Some((case.dataset.clone(), sequence.clone()));
         Ok(sequence)
@@ -238,7 +243,7 @@ impl Session {
     ) -> Result<Vec<PathBuf>, SessionError> {
         let failed = |source| SessionError::Format {
             case: case.name.clone(),
-            source,
+            source: Box::new(source),
         };
         let all = if case.dataset.starts_with('@') {
             let folder = self.scratch.path().join(&case.dataset[1..]);
@@ -252,7 +257,7 @@ impl Session {
                 .files(&case.dataset)
                 .map_err(|source| SessionError::Dataset {
                     case: case.name.clone(),
-                    source,
+                    source: Box::new(source),
                 })?
         };
         let absolute = |path: &Path| std::path::absolute(path);

@@ -138,18 +138,12 @@ struct Held {
 }
 
 impl Held {
-    /// Above 1 is a failure; NaN fails too.
+    /// Value over tolerance: above 1 is a failure, and so is NaN.
     fn load(&self) -> f64 {
         match &self.tolerance {
             None => 0.0,
-            Some(t) if self.value <= t.value => {
-                if t.value > 0.0 {
-                    self.value / t.value
-                } else {
-                    0.0
-                }
-            }
-            Some(t) if t.value > 0.0 && self.value.is_finite() => self.value / t.value,
+            Some(_) if self.value == 0.0 => 0.0,
+            Some(t) if self.value.is_finite() => self.value / t.value,
             Some(_) => f64::INFINITY,
         }
     }

@@ -17,16 +17,16 @@ pub type Measured = (&'static str, f64);
 /// What the quantities of one stage are.
 struct Judge {
     /// Recomputed from the inputs and one engine's outputs.
-    own: fn(&Bundle, &Bundle) -> Result<Vec<Measured>, ArrayError>,
+    own: Own,
     /// Differences between our outputs and another engine's, sign, order, gauge and rigid motion removed.
-    against: fn(&Bundle, &Bundle, &Bundle) -> Result<Vec<Measured>, ArrayError>,
+    against: Against,
 }
 
+type Own = fn(&Bundle, &Bundle) -> Result<Vec<Measured>, ArrayError>;
+type Against = fn(&Bundle, &Bundle, &Bundle) -> Result<Vec<Measured>, ArrayError>;
+
 fn judge(stage: &str) -> Option<Judge> {
-    let (own, against): (
-        fn(&Bundle, &Bundle) -> _,
-        fn(&Bundle, &Bundle, &Bundle) -> _,
-    ) = match stage {
+    let (own, against): (Own, Against) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
         "signal.h" => (shape::own, shape::against),
