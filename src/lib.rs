@@ -16,5 +16,6 @@
 pub mod harness;
 pub mod linalg;
 pub mod mesh;
+pub mod report;
 pub mod sequence;
 pub mod signal;
