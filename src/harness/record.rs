@@ -132,6 +132,8 @@ pub struct EngineRow {
 pub struct FitFigures {
     pub case: String,
     pub dataset: String,
+    /// d, the numbers in one frame (3V in vertex space); with k, l, m and n it tells which row of Table 1 is the same fit.
+    pub d: usize,
     /// As used: k, l, m and the number of frames.
     pub k: usize,
     pub l: usize,
