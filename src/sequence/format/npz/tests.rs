@@ -444,8 +444,12 @@ fn sequences_need_v_and_f_of_the_right_kind() {
     let [v, f] = good();
     write_arrays(&path, &good()).unwrap();
     assert_eq!(read(&path).unwrap().connectivity().faces(), [[0, 1, 2]]);
-    assert!(matches!(problem(&[f.clone()]), NpzProblem::Missing { array, .. } if array == "V"));
-    assert!(matches!(problem(&[v.clone()]), NpzProblem::Missing { array, .. } if array == "F"));
+    assert!(
+        matches!(problem(std::slice::from_ref(&f)), NpzProblem::Missing { array, .. } if array == "V")
+    );
+    assert!(
+        matches!(problem(std::slice::from_ref(&v)), NpzProblem::Missing { array, .. } if array == "F")
+    );
     assert!(matches!(
         problem(&[positions(&[3, 3], vec![0.0; 9]), f.clone()]),
         NpzProblem::Kind { .. }

@@ -142,7 +142,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn text(&self) -> String {
         let end = |c: &u8| matches!(c, b' ' | b'\t' | b'\r' | b'\n');
         let rest = self.rest();
-        let length = rest.iter().take(40).position(|c| end(c));
+        let length = rest.iter().take(40).position(end);
         let text = &rest[..length.unwrap_or(rest.len().min(40))];
         text.escape_ascii().to_string()
     }
