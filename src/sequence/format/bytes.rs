@@ -7,17 +7,23 @@ use std::path::{Path, PathBuf};
 use super::error::FormatError;
 use super::files;
 
+/// How many bytes a regular file holds; anything else is refused.
+pub(super) fn size(path: &Path) -> Result<u64, FormatError> {
+    let meta = fs::metadata(path).map_err(|e| FormatError::reading(path, e))?;
+    match meta.is_file() {
+        true => Ok(meta.len()),
+        false => Err(FormatError::NotAFile {
+            path: path.to_path_buf(),
+        }),
+    }
+}
+
 /// Opens a regular file and says how many bytes it holds.
 pub(super) fn open(path: &Path) -> Result<(File, u64), FormatError> {
-    let failed = |e| FormatError::reading(path, e);
     // Looked at before it is opened: opening a named pipe would wait for a writer.
-    let meta = fs::metadata(path).map_err(failed)?;
-    if !meta.is_file() {
-        return Err(FormatError::NotAFile {
-            path: path.to_path_buf(),
-        });
-    }
-    Ok((File::open(path).map_err(failed)?, meta.len()))
+    let size = size(path)?;
+    let file = File::open(path).map_err(|e| FormatError::reading(path, e))?;
+    Ok((file, size))
 }
 
 /// Reads a whole regular file into `buffer`, whose memory is reused.
