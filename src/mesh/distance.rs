@@ -176,7 +176,10 @@ mod tests {
         ) {
             let surface = Surface::new(&positions, &faces);
             for &p in queries.as_chunks::<3>().0 {
-                prop_assert_eq!(surface.distance(p), brute_force(p, &positions, &faces));
+                // Two triangles may be equally near but for rounding, and the tree leaves out one of them: a few units in
+                // the last place of coordinates of at most 2.
+                let (found, expected) = (surface.distance(p), brute_force(p, &positions, &faces));
+                prop_assert!(found == expected || (found - expected).abs() < 1e-14, "{} {}", found, expected);
             }
         }
 

@@ -7,17 +7,23 @@ use std::path::{Path, PathBuf};
 use super::error::FormatError;
 use super::files;
 
+/// How many bytes a regular file holds; anything else is refused.
+pub(super) fn size(path: &Path) -> Result<u64, FormatError> {
+    let meta = fs::metadata(path).map_err(|e| FormatError::reading(path, e))?;
+    match meta.is_file() {
+        true => Ok(meta.len()),
+        false => Err(FormatError::NotAFile {
+            path: path.to_path_buf(),
+        }),
+    }
+}
+
 /// Opens a regular file and says how many bytes it holds.
 pub(super) fn open(path: &Path) -> Result<(File, u64), FormatError> {
-    let failed = |e| FormatError::reading(path, e);
     // Looked at before it is opened: opening a named pipe would wait for a writer.
-    let meta = fs::metadata(path).map_err(failed)?;
-    if !meta.is_file() {
-        return Err(FormatError::NotAFile {
-            path: path.to_path_buf(),
-        });
-    }
-    Ok((File::open(path).map_err(failed)?, meta.len()))
+    let size = size(path)?;
+    let file = File::open(path).map_err(|e| FormatError::reading(path, e))?;
+    Ok((file, size))
 }
 
 /// Reads a whole regular file into `buffer`, whose memory is reused.
@@ -166,4 +172,130 @@ fn temporary(mode: u32) -> tempfile::Builder<'static, 'static> {
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(mode));
     builder
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::OpenOptions;
+
+    /// Takes `room` bytes, then fails as a full disk does.
+    struct Limited<W> {
+        inner: W,
+        room: usize,
+    }
+
+    impl<W: Write> Write for Limited<W> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            match bytes.len() <= self.room {
+                true => {
+                    self.room -= bytes.len();
+                    self.inner.write_all(bytes).map(|()| bytes.len())
+                }
+                false => Err(io::ErrorKind::StorageFull.into()),
+            }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.inner.flush()
+        }
+    }
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let names = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name());
+        names.map(|n| n.into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_full_disk_leaves_what_was_there_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        fs::write(&path, "before").unwrap();
+        for room in [0, 10, 100_000] {
+            let error = write_file(&path, |inner| {
+                let mut out = Limited { inner, room };
+                (0..200).try_for_each(|_| out.write_all(&[7; 1000]))
+            });
+            assert!(
+                matches!(error, Err(FormatError::DiskFull { .. })),
+                "{error:?}"
+            );
+            assert_eq!(fs::read(&path).unwrap(), b"before");
+            assert_eq!(entries(folder.path()), ["a.bin"]);
+        }
+    }
+
+    /// The operating system's own error for a full disk, from the device that always gives it.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_full_device_is_a_full_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut full = OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let error = write_file(&folder.path().join("a"), |_| full.write_all(b"x"));
+        assert!(
+            matches!(error, Err(FormatError::DiskFull { .. })),
+            "{error:?}"
+        );
+        assert_eq!(entries(folder.path()), [""; 0]);
+        // It is no regular file itself, and must not be replaced by one.
+        let error = write_file(Path::new("/dev/full"), |out| out.write_all(b"x"));
+        assert!(
+            matches!(error, Err(FormatError::NotAFile { .. })),
+            "{error:?}"
+        );
+    }
+
+    #[test]
+    fn a_folder_whose_frames_fail_is_not_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames");
+        let fail = |draft: &Path| {
+            fs::write(draft.join("0001.obj"), "v 0 0 0").unwrap();
+            Err(FormatError::writing(
+                &path,
+                io::ErrorKind::StorageFull.into(),
+            ))
+        };
+        for before in [0, 1] {
+            let error = write_folder(&path, fail);
+            assert!(
+                matches!(error, Err(FormatError::DiskFull { .. })),
+                "{error:?}"
+            );
+            assert_eq!(entries(folder.path()).len(), before);
+            fs::create_dir_all(&path).unwrap();
+            fs::write(path.join("7.obj"), "v 1 1 1").unwrap();
+        }
+        assert_eq!(entries(&path), ["7.obj"]);
+    }
+
+    #[test]
+    fn refusals_of_the_system_keep_their_kind() {
+        let error = FormatError::writing(Path::new("a"), io::ErrorKind::PermissionDenied.into());
+        assert!(matches!(error, FormatError::NotWritable { .. }));
+        let error = FormatError::writing(Path::new("a"), io::ErrorKind::ReadOnlyFilesystem.into());
+        assert!(matches!(error, FormatError::NotWritable { .. }));
+        let error = FormatError::reading(Path::new("a"), io::ErrorKind::NotFound.into());
+        assert!(matches!(error, FormatError::Missing { .. }));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn new_files_and_folders_have_the_permissions_of_new_files_and_folders() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |name: &str| {
+            fs::metadata(folder.path().join(name))
+                .unwrap()
+                .permissions()
+                .mode()
+        };
+        fs::write(folder.path().join("a"), "").unwrap();
+        fs::create_dir(folder.path().join("b")).unwrap();
+        write_file(&folder.path().join("c"), |_| Ok(())).unwrap();
+        write_folder(&folder.path().join("d"), |_| Ok(())).unwrap();
+        assert_eq!((mode("a"), mode("b")), (mode("c"), mode("d")));
+    }
 }

@@ -88,31 +88,23 @@ pub fn write_views(path: &Path, arrays: &[(&str, ArrayView)]) -> Result<(), Form
             ));
         }
     }
-    let headers = arrays
-        .iter()
-        .map(|(_, array)| npy::header(&elements::dtype(array), array.shape()));
-    let headers: Vec<Vec<u8>> = headers.collect();
-    let producers: Vec<_> = arrays
-        .iter()
-        .zip(&headers)
-        .map(|((_, array), header)| {
-            move |sink: &mut dyn FnMut(&[u8]) -> std::io::Result<()>| {
-                sink(header)?;
-                elements::produce(array, sink)
-            }
-        })
-        .collect();
     let entries: Vec<_> = arrays
         .iter()
-        .zip(&headers)
-        .zip(&producers)
-        .map(|(((name, array), header), produce)| zip_write::Entry {
-            name: format!("{name}.npy"),
-            length: (header.len() + elements::length(array)) as u64,
-            produce,
-        })
+        .map(|(name, array)| entry(name, *array))
         .collect();
     bytes::write_file(path, |out| zip_write::write(out, &entries))
+}
+
+fn entry<'a>(name: &str, array: ArrayView<'a>) -> zip_write::Entry<'a> {
+    let header = npy::header(&elements::dtype(&array), array.shape());
+    zip_write::Entry {
+        name: format!("{name}.npy"),
+        length: (header.len() + elements::length(&array)) as u64,
+        produce: Box::new(move |sink| {
+            sink(&header)?;
+            elements::produce(&array, sink)
+        }),
+    }
 }
 
 fn refuse(path: &Path, problem: NpzProblem) -> FormatError {
@@ -124,30 +116,29 @@ fn refuse(path: &Path, problem: NpzProblem) -> FormatError {
 
 /// Why an array cannot be written so that it reads back the same, if so.
 fn obstacle(name: &str, array: &ArrayView, repeated: bool) -> Option<String> {
+    if name.is_empty() || name.len() > 1000 || name.contains('\0') {
+        return Some("its name must have 1 to 1000 bytes and no NUL".into());
+    }
+    if repeated {
+        return Some("another array has the same name".into());
+    }
+    match array {
+        ArrayView::F64 { shape, data } => misfit(shape, data.len()),
+        ArrayView::I64 { shape, data } => misfit(shape, data.len()),
+        ArrayView::Text(text) => text.ends_with('\0').then(|| "the text ends in NUL".into()),
+    }
+}
+
+fn misfit(shape: &[usize], length: usize) -> Option<String> {
     /// What numpy reads.
     const MAX_AXES: usize = 32;
-    let length = match array {
-        ArrayView::F64 { data, .. } => data.len(),
-        ArrayView::I64 { data, .. } => data.len(),
-        ArrayView::Text(text) => {
-            return text.ends_with('\0').then(|| "the text ends in NUL".into());
-        }
-    };
-    let shape = array.shape();
+    if shape.len() > MAX_AXES {
+        return Some(format!("{} axes, expected at most {MAX_AXES}", shape.len()));
+    }
     let product = shape
         .iter()
         .try_fold(1usize, |total, &n| total.checked_mul(n));
-    if name.is_empty() || name.len() > 1000 || name.contains('\0') {
-        Some("its name must have 1 to 1000 bytes and no NUL".into())
-    } else if repeated {
-        Some("another array has the same name".into())
-    } else if shape.len() > MAX_AXES {
-        Some(format!("{} axes, expected at most {MAX_AXES}", shape.len()))
-    } else if product != Some(length) {
-        Some(format!("{length} elements do not fill the shape {shape:?}"))
-    } else {
-        None
-    }
+    (product != Some(length)).then(|| format!("{length} elements do not fill the shape {shape:?}"))
 }
 
 /// Reads a sequence from the arrays `V` (n, V, 3) of f64 or f32, which is widened, and `F` (F, 3) of 0-based integers.

@@ -57,8 +57,7 @@ pub(super) fn read(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
 fn read_frames(paths: &[PathBuf], first: &First, frame: &[f64]) -> Result<Vec<f64>, FormatError> {
     // Before n x 3V numbers are reserved, every file must be long enough to hold its V vertices.
     for (at, path) in paths.iter().enumerate().skip(1) {
-        let (_, size) = bytes::open(path)?;
-        if size + 1 < BYTES_PER_VERTEX * first.vertices {
+        if bytes::size(path)? + 1 < BYTES_PER_VERTEX * first.vertices {
             first.compare(at + 1, path, &mut Vec::new(), &mut [])?;
         }
     }

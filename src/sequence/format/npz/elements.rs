@@ -4,6 +4,7 @@ use std::io::{self, Read};
 
 use super::npy::{Header, Kind};
 use super::zip_read::ZipError;
+use super::zip_write::Sink;
 use super::{Array, ArrayView, NpzProblem};
 
 /// Bytes converted at a time; a multiple of every width.
@@ -192,10 +193,7 @@ pub(super) fn length(array: &ArrayView) -> usize {
 }
 
 /// Passes the little-endian bytes of all elements to `sink`, a chunk at a time.
-pub(super) fn produce(
-    array: &ArrayView,
-    sink: &mut dyn FnMut(&[u8]) -> io::Result<()>,
-) -> io::Result<()> {
+pub(super) fn produce(array: &ArrayView, sink: Sink) -> io::Result<()> {
     match array {
         ArrayView::F64 { data, .. } => words(data, |x| x.to_le_bytes(), sink),
         ArrayView::I64 { data, .. } => words(data, |x| x.to_le_bytes(), sink),
@@ -207,11 +205,7 @@ pub(super) fn produce(
     }
 }
 
-fn words<T: Copy>(
-    data: &[T],
-    bytes: impl Fn(T) -> [u8; 8],
-    sink: &mut dyn FnMut(&[u8]) -> io::Result<()>,
-) -> io::Result<()> {
+fn words<T: Copy>(data: &[T], bytes: impl Fn(T) -> [u8; 8], sink: Sink) -> io::Result<()> {
     let mut chunk = vec![[0; 8]; (CHUNK / 8).min(data.len())];
     for part in data.chunks(CHUNK / 8) {
         for (word, &x) in chunk.iter_mut().zip(part) {

@@ -14,8 +14,11 @@ pub(super) struct Entry<'a> {
     pub(super) name: String,
     pub(super) length: u64,
     /// Passes the contents, in parts of any length, to its argument.
-    pub(super) produce: &'a dyn Fn(&mut dyn FnMut(&[u8]) -> io::Result<()>) -> io::Result<()>,
+    pub(super) produce: Box<dyn Fn(Sink) -> io::Result<()> + 'a>,
 }
+
+/// Takes a part of the contents.
+pub(super) type Sink<'a> = &'a mut dyn FnMut(&[u8]) -> io::Result<()>;
 
 struct Written {
     name: String,
@@ -167,11 +170,10 @@ mod tests {
                 vec![0; 16],
             ]
             .concat();
-            let produce = |sink: &mut dyn FnMut(&[u8]) -> io::Result<()>| sink(&array);
             let entry = |name: &str| Entry {
                 name: name.into(),
                 length: array.len() as u64,
-                produce: &produce,
+                produce: Box::new(|sink| sink(&array)),
             };
             let mut bytes = Vec::new();
             write_from(&mut bytes, &[entry("a.npy"), entry("ä.npy")], large).unwrap();

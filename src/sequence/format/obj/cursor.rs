@@ -44,6 +44,11 @@ impl<'a> Cursor<'a> {
         self.at == self.bytes.len()
     }
 
+    /// Whether [`Cursor::rest`] reaches to the end of the file.
+    pub(super) fn sees_end_of_file(&self) -> bool {
+        self.limit == self.bytes.len()
+    }
+
     /// What is left of this line and what follows, up to the allowance of one line.
     #[inline]
     pub(super) fn rest(&self) -> &'a [u8] {
@@ -127,7 +132,7 @@ impl<'a> Cursor<'a> {
     }
 
     fn refuse_long_line(&self) -> Result<(), Fault> {
-        match self.at == self.limit && self.limit < self.bytes.len() {
+        match self.at == self.limit && !self.sees_end_of_file() {
             true => Err(self.fault(ObjProblem::LineTooLong)),
             false => Ok(()),
         }
@@ -137,7 +142,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn text(&self) -> String {
         let end = |c: &u8| matches!(c, b' ' | b'\t' | b'\r' | b'\n');
         let rest = self.rest();
-        let length = rest.iter().take(40).position(|c| end(c));
+        let length = rest.iter().take(40).position(end);
         let text = &rest[..length.unwrap_or(rest.len().min(40))];
         text.escape_ascii().to_string()
     }

@@ -84,6 +84,37 @@ fn vertex(
     seen: &mut Summary,
     visitor: &mut impl Visitor,
 ) -> Result<(), Fault> {
+    let position = match plain_position(cursor.rest()) {
+        Some((position, length)) => {
+            cursor.advance(length);
+            position
+        }
+        None => any_position(cursor, seen)?,
+    };
+    visitor.vertex(position);
+    seen.vertices += 1;
+    seen.vertex_after_face |= seen.first_face.is_some();
+    Ok(())
+}
+
+/// The position on a line `v x y z`, as nearly all are, and its length; whatever is not so plain is for [`any_position`].
+#[inline]
+fn plain_position(rest: &[u8]) -> Option<([f64; 3], usize)> {
+    let mut position = [0.0f64; 3];
+    let mut at = 1;
+    for coordinate in &mut position {
+        let text = rest.get(at..)?.strip_prefix(b" ")?;
+        let (value, length) = fast_float2::parse_partial(text).ok()?;
+        *coordinate = value;
+        at += 1 + length;
+    }
+    let ends = matches!(rest.get(at), Some(b'\n' | b'\r'));
+    let finite = position.iter().all(|x| x.is_finite());
+    (ends && finite).then_some((position, at))
+}
+
+/// The position on any line `v ...`, up to the end of the line.
+fn any_position(cursor: &mut Cursor, seen: &Summary) -> Result<[f64; 3], Fault> {
     cursor.advance(1);
     let mut position = [0.0; 3];
     for (found, coordinate) in position.iter_mut().enumerate() {
@@ -99,10 +130,7 @@ fn vertex(
         cursor.advance(length);
     }
     weight_or_colour(cursor)?;
-    visitor.vertex(position);
-    seen.vertices += 1;
-    seen.vertex_after_face |= seen.first_face.is_some();
-    Ok(())
+    Ok(position)
 }
 
 /// The number that comes next and its length in bytes. Correctly rounded.
@@ -110,6 +138,9 @@ fn vertex(
 fn number(cursor: &Cursor) -> Result<(f64, usize), Fault> {
     let rest = cursor.rest();
     match fast_float2::parse_partial(rest) {
+        Ok((_, length)) if length == rest.len() && !cursor.sees_end_of_file() => {
+            Err(cursor.fault(ObjProblem::LineTooLong))
+        }
         Ok((value, length)) if rest.get(length).is_none_or(|&c| ends_keyword(c)) => {
             Ok((value, length))
         }
