@@ -7,7 +7,7 @@ use clap::Args;
 use super::output::{say, write_whole};
 use super::{Failure, Outcome};
 use crate::harness::record::Record;
-use crate::report;
+use crate::report::{self, PublishedRow};
 
 #[derive(Args)]
 pub struct Report {
@@ -20,7 +20,7 @@ pub struct Report {
 
 /// The page of a record.
 pub fn page(record: &Record) -> Result<String, Failure> {
-    Ok(report::html(record, &report::published()?))
+    Ok(report::html(record, &PublishedRow::table_1()?))
 }
 
 impl Report {

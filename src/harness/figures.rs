@@ -37,6 +37,7 @@ pub fn draw(case: &Case, frames: MatRef<'_, f64>) -> Result<FitFigures, StageErr
         k,
         l,
         m,
+        d: frames.nrows(),
         frames: n,
         positions: fit.positions.clone(),
         frame_points: (1..=n).map(|i| time.evaluate(i as f64)).collect(),
