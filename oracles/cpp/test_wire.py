@@ -1,8 +1,8 @@
 """Asks the C++ and R oracles what has a closed-form answer, and what is not a request at all.
 
-    /tmp/venv/bin/python oracles/cpp/test_wire.py [folder of the built C++ programs, else /tmp/cpp-build]
+    target/oracles/venv/bin/python oracles/cpp/test_wire.py [folder of the built C++ programs, else target/oracles/cpp]
 
-A program that is not there is skipped, and said so; the exit code is 1 if any check failed or nothing could be asked.
+A program that is not there is skipped, and said so; the exit code is 1 if any check failed.
 """
 
 import pathlib
@@ -18,7 +18,7 @@ FOLDER = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parent / "python"))
 from wire import read_message, write_message  # noqa: E402
 
-BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "/tmp/cpp-build")
+BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else FOLDER.parents[1] / "target/oracles/cpp")
 RSCRIPT = shutil.which("Rscript")
 
 
@@ -169,4 +169,5 @@ with tempfile.TemporaryDirectory() as SCRATCH:
         else:
             passed += 1
             print(f"passed  {name}")
-sys.exit(0 if passed and not failed else 1)
+print(f"{passed} passed, {failed} failed")
+sys.exit(1 if failed else 0)

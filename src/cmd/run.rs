@@ -9,7 +9,7 @@ use super::{Failure, Outcome, home};
 use crate::harness::case::{Case, read_all, select};
 use crate::harness::inject::{self, FAULTS};
 use crate::harness::record::{Record, Verdict};
-use crate::harness::session::{Event, Options, Session};
+use crate::harness::session::{Event, Options, Session, Timing};
 use crate::harness::verify::Judged;
 use crate::sequence::dataset::DataFolders;
 
@@ -40,6 +40,9 @@ pub struct Verify {
     /// Fail where an engine is missing
     #[arg(long)]
     require_oracles: bool,
+    /// Time the engines that agree, on the cases marked for it
+    #[arg(long)]
+    time: bool,
     /// Make a Rust stage wrong on purpose; exit code 1 says that it was caught. `list` names the faults
     #[arg(long, value_name = "FAULT")]
     inject: Option<String>,
@@ -64,7 +67,8 @@ impl Verify {
             None => None,
         };
         let cases = select(read_all(&home().join("bench/cases"))?, &self.run.cases)?;
-        let record = self.run.execute(&cases, fault, false)?;
+        let timing = if self.time { Timing::Marked } else { Timing::None };
+        let record = self.run.execute(&cases, fault, timing)?;
         let wrong = record.agreement.iter().filter(|row| {
             !matches!(
                 row.verdict,
@@ -85,7 +89,7 @@ impl Measure {
         if self.run.cases.is_empty() {
             cases.retain(|case| case.measure);
         }
-        let record = self.run.execute(&cases, None, true)?;
+        let record = self.run.execute(&cases, None, Timing::All)?;
         Ok(record
             .agreement
             .iter()
@@ -98,7 +102,7 @@ impl Run {
         &self,
         cases: &[Case],
         fault: Option<&'static inject::Fault>,
-        measure: bool,
+        timing: Timing,
     ) -> Result<Record, Failure> {
         let folder = self.folder()?;
         let options = Options {
@@ -106,7 +110,7 @@ impl Run {
             data: DataFolders::new(self.data.as_deref()),
             engines: self.engines.clone(),
             fault,
-            measure,
+            timing,
         };
         let mut session = Session::open(options, cases)?;
         let bar = progress(cases.len());

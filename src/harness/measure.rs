@@ -13,7 +13,7 @@ use crate::stages::{self, Stage};
 const SAMPLE_SECONDS: f64 = 2e-3;
 const MOST_BATCH: f64 = 2000.0;
 /// All rounds of one engine on one case last about this long.
-const BUDGET_SECONDS: f64 = 4.0;
+const BUDGET_SECONDS: f64 = 2.0;
 const ROUNDS: (usize, usize) = (3, 25);
 
 /// Times the engines of these places in the list (those that agree) on a case. Every round asks each once; each answers after a warm-up call where that

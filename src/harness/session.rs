@@ -28,8 +28,17 @@ pub struct Options {
     /// Engines to ask besides Rust; all where empty.
     pub engines: Vec<String>,
     pub fault: Option<&'static Fault>,
-    /// Whether to time what agrees.
-    pub measure: bool,
+    pub timing: Timing,
+}
+
+/// Which cases are timed once their engines agree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Timing {
+    #[default]
+    None,
+    /// Those that say so.
+    Marked,
+    All,
 }
 
 /// Why a run cannot go on.
@@ -173,7 +182,12 @@ impl Session {
             record.agreement.push(one.row.clone());
             record.accuracy.extend(one.quantities.iter().cloned());
         }
-        if self.options.measure {
+        let timed = match self.options.timing {
+            Timing::None => false,
+            Timing::Marked => case.measure,
+            Timing::All => true,
+        };
+        if timed {
             let agreeing = self.agreeing(case, &judged);
             let (timing, samples) = measure(case, &inputs, &mut self.engines, &agreeing);
             record.timing.extend(timing);
