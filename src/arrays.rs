@@ -54,6 +54,14 @@ impl Array {
         }
     }
 
+    /// Its extents; none for a scalar or a text.
+    pub fn shape(&self) -> &[usize] {
+        match self {
+            Self::F64 { shape, .. } | Self::I64 { shape, .. } => shape,
+            Self::Text(_) => &[],
+        }
+    }
+
     /// f64, i64 or text.
     pub fn kind(&self) -> &'static str {
         match self {

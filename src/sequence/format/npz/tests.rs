@@ -113,7 +113,7 @@ proptest! {
         prop_assert_eq!(read.len(), arrays.len());
         for ((name, array), (wanted_name, wanted)) in read.iter().zip(&named) {
             prop_assert_eq!(name, wanted_name);
-            prop_assert_eq!(array.view().shape(), wanted.view().shape());
+            prop_assert_eq!(array.shape(), wanted.shape());
             prop_assert_eq!(std::mem::discriminant(array), std::mem::discriminant(wanted));
             prop_assert_eq!(bits(array), bits(wanted));
         }
@@ -134,7 +134,7 @@ proptest! {
         }
         if let Ok(arrays) = read_bytes(&bytes) {
             for (_, array) in arrays.iter().filter(|(name, _)| name == "a") {
-                let all = array.view().shape().iter().product::<usize>();
+                let all = array.shape().iter().product::<usize>();
                 prop_assert_eq!(bits(array).len(), all);
             }
         }
