@@ -239,12 +239,23 @@ mod tests {
             "{error:?}"
         );
         assert_eq!(entries(folder.path()), [""; 0]);
-        // It is no regular file itself, and must not be replaced by one.
-        let error = write_file(Path::new("/dev/full"), |out| out.write_all(b"x"));
+    }
+
+    /// A socket stands for any device or pipe: should the guard fail, the test must not replace one of the machine's own.
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_regular_file_is_not_replaced_by_one() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("socket");
+        let _socket = std::os::unix::net::UnixListener::bind(&path).unwrap();
+        let error = write_file(&path, |out| out.write_all(b"x"));
         assert!(
             matches!(error, Err(FormatError::NotAFile { .. })),
             "{error:?}"
         );
+        assert!(fs::metadata(&path).unwrap().file_type().is_socket());
+        assert_eq!(entries(folder.path()), ["socket"]);
     }
 
     #[test]
