@@ -1,5 +1,7 @@
 //! Deforming mesh sequences: n frames over one connectivity.
 
+pub mod synthetic;
+
 use std::sync::Arc;
 
 use thiserror::Error;
