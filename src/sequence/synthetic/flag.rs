@@ -35,12 +35,14 @@ pub(super) const SMALL: Size = Size {
 };
 
 const FRAME_SECONDS: f64 = 1.0 / 30.0;
-const SUBSTEPS: usize = 8;
-const WARM_UP: usize = 3 * GUST;
+const SUBSTEPS: usize = 6;
+const WARM_UP: usize = 2 * GUST;
 /// Mass of a square metre of cloth.
-const DENSITY: f64 = 0.16;
+const DENSITY: f64 = 0.12;
 /// Pressure of the air for each unit of its velocity along the normal.
-const DRAG: f64 = 2.4;
+const DRAG: f64 = 1.0;
+/// Pull of the air on a unit of area for each unit of its velocity.
+const FRICTION: f64 = 0.45;
 const GRAVITY: f64 = -9.81;
 /// The part of its velocity that the cloth loses in a second.
 const DAMPING: f64 = 0.6;
@@ -70,9 +72,9 @@ fn flat(columns: usize, rows: usize) -> Vec<Vector3<f64>> {
 fn wind(t: f64, x: f64) -> Vector3<f64> {
     let phase = TAU * (t / (GUST as f64 * FRAME_SECONDS) - x / 2.4);
     Vector3::new(
-        6.0 + 0.8 * (phase + 1.0).sin(),
+        7.0 + 0.8 * (phase + 1.0).sin(),
         0.9 + 0.5 * phase.sin(),
-        2.6 * phase.sin() + 0.7 * (2.0 * phase + 0.4).sin(),
+        3.0 * phase.sin() + 0.7 * (2.0 * phase + 0.4).sin(),
     )
 }
 
@@ -84,6 +86,8 @@ struct Spring {
 }
 
 struct Cloth {
+    rows: usize,
+    spacing: f64,
     faces: Vec<[u32; 3]>,
     points: Vec<Vector3<f64>>,
     velocities: Vec<Vector3<f64>>,
@@ -98,6 +102,8 @@ impl Cloth {
         let inverse_mass = 1.0 / (DENSITY * spacing * spacing);
         let pinned = |v: usize| v <= rows;
         Self {
+            rows,
+            spacing,
             faces: grid::faces(columns, rows),
             velocities: vec![Vector3::zeros(); points.len()],
             inverse_masses: (0..points.len())
@@ -127,12 +133,26 @@ impl Cloth {
                 *point += self.velocities[v] * step;
             }
         }
+        self.keep_within_reach();
         // away from the pole and back, so that a pull crosses the whole cloth in one step
         for spring in self.springs.iter().chain(self.springs.iter().rev()) {
             spring.pull(&mut self.points, &self.inverse_masses, step);
         }
         for (v, velocity) in self.velocities.iter_mut().enumerate() {
             *velocity = (self.points[v] - before[v]) / step;
+        }
+    }
+
+    /// No point can be further from the pole's point of its row than the cloth between them is long (Kim et al. 2012).
+    fn keep_within_reach(&mut self) {
+        let ring = self.rows + 1;
+        for v in ring..self.points.len() {
+            let (anchor, reach) = (self.points[v % ring], self.spacing * (v / ring) as f64);
+            let along = self.points[v] - anchor;
+            let length = along.norm();
+            if length > reach {
+                self.points[v] = anchor + along * (reach / length);
+            }
         }
     }
 
@@ -145,8 +165,9 @@ impl Cloth {
                 0.5 * (self.points[b] - self.points[a]).cross(&(self.points[c] - self.points[a]));
             let centre_x = (self.points[a].x + self.points[b].x + self.points[c].x) / 3.0;
             let relative = wind(t, centre_x) - (old[a] + old[b] + old[c]) / 3.0;
-            let impulse =
-                area * (DRAG * step * relative.dot(&area) / (3.0 * area.norm().max(1e-12)));
+            let size = area.norm().max(1e-12);
+            let pressure = area * (DRAG * relative.dot(&area) / size);
+            let impulse = (pressure + relative * (FRICTION * size)) * (step / 3.0);
             for v in [a, b, c] {
                 self.velocities[v] += impulse * self.inverse_masses[v];
             }
@@ -174,7 +195,7 @@ impl Spring {
 fn springs(columns: usize, rows: usize, rest: &[Vector3<f64>]) -> Vec<Spring> {
     const STIFF: f64 = 0.0;
     const SHEAR: f64 = 1e-5;
-    const BENDING: f64 = 5e-2;
+    const BENDING: f64 = 1e-2;
     // columns and rows from the first end to the second
     let kinds: [(usize, isize, f64); 6] = [
         (0, 1, STIFF),

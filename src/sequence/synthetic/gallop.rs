@@ -36,12 +36,12 @@ pub(super) const FULL: Size = Size {
     build: Build { limb: 1.0 },
 };
 pub(super) const SMALL: Size = Size {
-    spacing: 0.115,
-    build: Build { limb: 1.5 },
+    spacing: 0.135,
+    build: Build { limb: 2.0 },
 };
 
 /// How far along the skin a bone's pull fades into the next one's.
-const REACH: f64 = 0.075;
+const REACH: f64 = 0.14;
 
 /// The joint markers of `@gallop`: the same names, in the same order, as those of `@gallop-small`.
 pub fn markers() -> Vec<Marker> {
@@ -115,11 +115,11 @@ fn sway(rotations: &mut [UnitQuaternion<f64>], drift: f64, phase: f64) {
 
 /// Degrees of thigh, shank, cannon and hoof at `at` cycles after the leg reaches furthest forward.
 fn hind_leg(at: f64) -> [f64; 4] {
-    let swing = bump(at - 0.74);
+    let swing = bump(at - 0.77);
     [
-        4.0 + 33.0 * (TAU * at).cos() + 12.0 * bump(at - 0.82),
-        -4.0 - 10.0 * (TAU * (at + 0.1)).cos() - 48.0 * swing,
-        -6.0 + 8.0 * (TAU * at).sin() + 52.0 * swing,
+        -6.0 + 36.0 * (TAU * at).cos() + 14.0 * bump(at - 0.84),
+        2.0 - 16.0 * (TAU * (at + 0.05)).cos() - 38.0 * swing,
+        -6.0 + 8.0 * (TAU * at).sin() + 58.0 * swing,
         14.0 * bump(at - 0.3) - 45.0 * bump(at - 0.68),
     ]
 }

@@ -22,7 +22,7 @@ pub(super) const FULL: Size = Size {
     every: 1,
 };
 pub(super) const SMALL: Size = Size {
-    spacing: 0.11,
+    spacing: 0.115,
     every: 3,
 };
 
@@ -75,12 +75,7 @@ fn animal() -> Solid {
         part(v(-0.36, 0.66, 0.0), v(0.34, 0.68, 0.0), [0.27, 0.26], 0.1),
         part(v(0.46, 0.82, 0.0), v(0.70, 0.98, 0.0), [0.17, 0.165], 0.16),
         part(v(0.72, 0.96, 0.0), v(0.95, 0.86, 0.0), [0.165, 0.12], 0.1),
-        part(
-            v(-0.58, 0.78, 0.0),
-            v(-0.92, 0.70, 0.0),
-            [0.085, 0.075],
-            0.1,
-        ),
+        part(v(-0.58, 0.78, 0.0), v(-0.92, 0.70, 0.0), [0.10, 0.095], 0.1),
     ];
     for side in [-1.0, 1.0] {
         for x in [-0.42, 0.40] {
@@ -88,7 +83,7 @@ fn animal() -> Solid {
             cones.push(part(hip, foot, [0.14, 0.12], 0.1));
         }
         let (root, tip) = (v(0.66, 1.08, 0.11 * side), v(0.60, 1.20, 0.30 * side));
-        cones.push(part(root, tip, [0.09, 0.08], 0.08));
+        cones.push(part(root, tip, [0.105, 0.095], 0.08));
     }
     Solid { cones }
 }
@@ -174,10 +169,10 @@ fn lift(since: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
     (shift, turn)
 }
 
-/// Forward and up and back again, twisting the neck.
+/// Up and forward, twisting the neck.
 fn tug(since: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
-    let pulled = smoothstep(0.0, 0.5, since) - 0.7 * smoothstep(0.5, 0.8, since);
-    let shift = Vector3::new(0.5 * pulled, 0.7 * pulled, 0.3 * pulled);
+    let pulled = smoothstep(0.0, 0.7, since);
+    let shift = Vector3::new(0.3 * pulled, 1.5 * pulled, -0.4 * pulled);
     (
         shift,
         UnitQuaternion::from_euler_angles(1.1 * pulled, 0.0, 0.0),

@@ -54,8 +54,8 @@ impl Animal {
             landmarks: Vec::new(),
         };
         animal.add_trunk();
-        animal.add_head();
-        animal.add_tail(build.limb);
+        animal.add_head(0.5 + 0.5 * build.limb);
+        animal.add_tail(0.5 + 0.5 * build.limb);
         for (side, names) in [(-1.0, HIND_NAMES[0]), (1.0, HIND_NAMES[1])] {
             animal.add_leg(TORSO, &HIND, side, build.limb, names);
         }
@@ -120,7 +120,7 @@ impl Animal {
         ]);
     }
 
-    fn add_head(&mut self) {
+    fn add_head(&mut self, stout: f64) {
         let neck = self.bone(Some(CHEST), sagittal(0.55, 1.30));
         let head = self.bone(Some(neck), sagittal(1.05, 1.88));
         let (base, poll, nose) = (
@@ -139,13 +139,13 @@ impl Animal {
         self.cone(
             head,
             [sagittal(1.07, 1.84), nose],
-            [0.135, 0.075],
+            [0.135, 0.075].map(|r| r * stout),
             [0.75, 0.07],
         );
         self.cone(
             head,
             [sagittal(1.10, 1.74), sagittal(1.18, 1.68)],
-            [0.10, 0.08],
+            [0.10, 0.08].map(|r| r * stout),
             [0.7, 0.06],
         );
         for side in [-1.0, 1.0] {
@@ -153,7 +153,7 @@ impl Animal {
                 Vector3::new(1.02, 1.93, 0.055 * side),
                 Vector3::new(1.03, 2.08, 0.10 * side),
             ];
-            self.cone(head, ear, [0.05, 0.03], [1.0, 0.04]);
+            self.cone(head, ear, [0.05, 0.03].map(|r| r * stout), [1.0, 0.04]);
         }
         self.landmarks.extend([
             ("poll", sagittal(0.99, 2.0)),
@@ -196,7 +196,7 @@ impl Animal {
     ) {
         let joints: [Vector3<f64>; 5] = std::array::from_fn(|i| {
             let [x, y, z] = leg.joints[i];
-            Vector3::new(x, y, z * side)
+            Vector3::new(x, y, z * side * (1.0 + 0.4 * (stout - 1.0)))
         });
         let mut parent = parent;
         for i in 0..4 {
@@ -264,7 +264,7 @@ const HIND: Leg = Leg {
         [-0.66, 0.16, 0.15],
         [-0.58, 0.05, 0.15],
     ],
-    radii: [0.20, 0.13, 0.062, 0.05, 0.065],
+    radii: [0.20, 0.115, 0.062, 0.05, 0.065],
     blends: [0.12, 0.08, 0.05, 0.04],
 };
 const FORE: Leg = Leg {
