@@ -1,0 +1,224 @@
+//! `@gallop`: a quadruped that gallops in place.
+//!
+//! 24 frames are two cycles of 12 in a transverse gallop (left hind, right hind, left fore, right fore, flight), alike but not equal: a
+//! stride's strength and timing drift over both cycles and close after 24 frames, like the horse of Cashman & Hormann 2012, Figure 1. The
+//! root does not travel; it bobs, surges and pitches. The skin is closed and of genus 0.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use super::quadruped::{Animal, Build, CHEST, HEAD, LEGS, NECK, TAIL, TORSO, Weights};
+use super::{SyntheticError, assemble};
+use crate::sequence::Sequence;
+
+/// Number of frames of `@gallop` and of `@gallop-small`: two cycles.
+pub const FRAMES: usize = 24;
+/// Number of frames of one cycle.
+pub const CYCLE: usize = 12;
+
+/// A named place of the body and the vertex (0-based) nearest to it at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Marker {
+    /// What it marks: `withers`, `left_knee`, ...; left is -z.
+    pub name: &'static str,
+    /// The vertex, 0-based.
+    pub vertex: u32,
+}
+
+pub(super) struct Size {
+    spacing: f64,
+    build: Build,
+}
+
+pub(super) const FULL: Size = Size {
+    spacing: 0.046,
+    build: Build { limb: 1.0 },
+};
+pub(super) const SMALL: Size = Size {
+    spacing: 0.135,
+    build: Build { limb: 2.0 },
+};
+
+/// How far along the skin a bone's pull fades into the next one's.
+const REACH: f64 = 0.14;
+
+/// The joint markers of `@gallop`: the same names, in the same order, as those of `@gallop-small`.
+pub fn markers() -> Vec<Marker> {
+    find_markers(&FULL)
+}
+
+/// The joint markers of `@gallop-small`.
+pub fn markers_small() -> Vec<Marker> {
+    find_markers(&SMALL)
+}
+
+fn find_markers(size: &Size) -> Vec<Marker> {
+    let animal = Animal::new(size.build);
+    let skin = animal.skin(size.spacing);
+    let marked = animal.marked(&skin.points).into_iter();
+    marked
+        .map(|(name, vertex)| Marker { name, vertex })
+        .collect()
+}
+
+pub(super) fn build(size: &Size) -> Result<Sequence, SyntheticError> {
+    let animal = Animal::new(size.build);
+    let skin = animal.skin(size.spacing);
+    let weights = Weights::new(&animal, &skin, size.spacing, REACH);
+    let frames: Vec<_> = (0..FRAMES)
+        .map(|i| {
+            let (root, rotations) = pose(i, animal.bones.len());
+            weights.skin(&skin.points, &animal.place(root, &rotations))
+        })
+        .collect();
+    assemble(skin.faces, &frames)
+}
+
+/// The motion of the root and the rotation of each bone relative to its parent, in frame `frame`.
+fn pose(frame: usize, bones: usize) -> (Isometry3<f64>, Vec<UnitQuaternion<f64>>) {
+    let drift = TAU * frame as f64 / FRAMES as f64;
+    let vigour = 1.0 + 0.09 * (drift + 0.7).sin();
+    let phase = frame as f64 / CYCLE as f64 + 0.018 * (drift + 2.0).sin();
+    let wave = |lag: f64| (TAU * (phase - lag)).cos();
+    let mut rotations = vec![UnitQuaternion::identity(); bones];
+
+    let mut turn = |bone: usize, degrees: f64| rotations[bone] = about_z(vigour * degrees);
+    turn(TORSO, -6.0 * wave(0.62));
+    turn(CHEST, 9.0 * wave(0.12));
+    turn(NECK, -9.0 * wave(0.60) - 8.0);
+    turn(HEAD, 7.0 * wave(0.72) + 4.0);
+    for (i, bone) in TAIL.into_iter().enumerate() {
+        let lift = [-20.0, -6.0, -2.0][i];
+        turn(bone, lift + 11.0 * wave(0.2 + 0.14 * i as f64));
+    }
+    for (leg, first) in LEGS.into_iter().enumerate() {
+        let at = phase - [0.0, 0.12, 0.42, 0.56][leg];
+        let angles = if leg < 2 { hind_leg(at) } else { fore_leg(at) };
+        for (i, degrees) in angles.into_iter().enumerate() {
+            turn(first + i, degrees);
+        }
+    }
+    sway(&mut rotations, drift, phase);
+    let bob = Vector3::new(0.025 * wave(0.4), 0.02 + 0.06 * vigour * wave(0.92), 0.0);
+    (Isometry3::translation(bob.x, bob.y, bob.z), rotations)
+}
+
+/// Turns tail and neck a little to the sides.
+fn sway(rotations: &mut [UnitQuaternion<f64>], drift: f64, phase: f64) {
+    for (bone, degrees) in [(NECK, 2.0), (TAIL[0], 7.0), (TAIL[1], 6.0), (TAIL[2], 6.0)] {
+        let angle = degrees * ((TAU * phase - 0.5 * bone as f64).sin() + 0.5 * drift.cos());
+        let aside = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle.to_radians());
+        rotations[bone] = aside * rotations[bone];
+    }
+}
+
+/// Degrees of thigh, shank, cannon and hoof at `at` cycles after the leg reaches furthest forward.
+fn hind_leg(at: f64) -> [f64; 4] {
+    let swing = bump(at - 0.77);
+    [
+        -6.0 + 36.0 * (TAU * at).cos() + 14.0 * bump(at - 0.84),
+        2.0 - 16.0 * (TAU * (at + 0.05)).cos() - 38.0 * swing,
+        -6.0 + 8.0 * (TAU * at).sin() + 58.0 * swing,
+        14.0 * bump(at - 0.3) - 45.0 * bump(at - 0.68),
+    ]
+}
+
+/// Degrees of upper arm, forearm, cannon and hoof at `at` cycles after the leg reaches furthest forward.
+fn fore_leg(at: f64) -> [f64; 4] {
+    let swing = bump(at - 0.72);
+    [
+        2.0 + 26.0 * (TAU * at).cos(),
+        4.0 + 12.0 * (TAU * (at - 0.05)).cos() + 38.0 * swing,
+        -2.0 - 88.0 * swing,
+        16.0 * bump(at - 0.25) - 48.0 * bump(at - 0.70),
+    ]
+}
+
+/// A smooth bump of height 1 and of period 1, about a third of a period wide, at 0.
+fn bump(at: f64) -> f64 {
+    (2.2 * ((TAU * at).cos() - 1.0)).exp()
+}
+
+fn about_z(degrees: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{checks, embedded};
+    use super::*;
+
+    #[test]
+    fn the_skin_is_a_closed_sphere_with_an_inside() {
+        for name in ["@gallop", "@gallop-small"] {
+            checks::assert_sphere(&embedded(name).unwrap());
+        }
+    }
+
+    #[test]
+    fn the_second_cycle_resembles_the_first_but_differs() {
+        let sequence = embedded("@gallop").unwrap();
+        let distance = |i: usize, j: usize| {
+            let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
+            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+        };
+        for i in 0..CYCLE {
+            let (across, along) = (distance(i, i + CYCLE), distance(i, (i + 6) % FRAMES));
+            assert!(across < 0.35 * along, "{i}: {across} {along}");
+            assert!(across > 0.02 * along, "{i}: {across} {along}");
+        }
+    }
+
+    #[test]
+    fn it_gallops_in_place() {
+        let sequence = embedded("@gallop").unwrap();
+        for i in 0..FRAMES {
+            let points = checks::points(sequence.frame(i));
+            let centre: Vector3<f64> = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+            assert!(
+                centre.x.abs() < 0.25 && (0.7..1.4).contains(&centre.y) && centre.z.abs() < 0.02
+            );
+            let lowest = points.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+            assert!(lowest > -0.15, "frame {i}: {lowest}");
+        }
+    }
+
+    #[test]
+    fn the_volume_hardly_changes() {
+        let sequence = embedded("@gallop").unwrap();
+        let first = checks::volume(&sequence, 0);
+        for i in 1..FRAMES {
+            let ratio = checks::volume(&sequence, i) / first;
+            assert!((ratio - 1.0).abs() < 0.05, "frame {i}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn markers_are_distinct_vertices_with_the_same_names_in_both_sizes() {
+        let (full, small) = (markers(), markers_small());
+        assert!(full.iter().map(|m| m.name).eq(small.iter().map(|m| m.name)));
+        for (name, markers) in [("@gallop", full), ("@gallop-small", small)] {
+            let count = embedded(name).unwrap().connectivity().vertex_count();
+            let mut vertices: Vec<u32> = markers.iter().map(|m| m.vertex).collect();
+            assert!(vertices.iter().all(|&v| (v as usize) < count));
+            vertices.sort_unstable();
+            vertices.dedup();
+            assert_eq!(vertices.len(), markers.len(), "{name}");
+        }
+    }
+
+    #[test]
+    fn markers_lie_on_their_sides() {
+        let sequence = embedded("@gallop").unwrap();
+        let points = checks::points(sequence.frame(0));
+        for marker in markers() {
+            let z = points[marker.vertex as usize].z;
+            match marker.name.split_once('_') {
+                Some(("left", _)) => assert!(z < -0.1, "{}", marker.name),
+                Some(("right", _)) => assert!(z > 0.1, "{}", marker.name),
+                _ => assert!(z.abs() < 0.1, "{}", marker.name),
+            }
+        }
+    }
+}

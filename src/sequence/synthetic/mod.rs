@@ -1,0 +1,276 @@
+//! The embedded sequences, `@name`: made at run time, so that tests, benchmarks and first steps need no data.
+//!
+//! Every sequence is deterministic to the bit on one machine (one thread, no clock, no chance) and takes well under a second in a release
+//! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
+//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
+
+pub mod bar;
+pub mod flag;
+pub mod gallop;
+pub mod jelly;
+pub mod roll;
+
+#[cfg(test)]
+mod checks;
+mod grid;
+mod implicit;
+mod quadruped;
+mod soft_body;
+mod surface_nets;
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::{Sequence, SequenceError};
+use crate::mesh::{Connectivity, ConnectivityError};
+
+/// One embedded sequence: its name, its size and what it is good for.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The name with its `@`, as [`embedded`] takes it.
+    pub name: &'static str,
+    /// What moves and how, in one line.
+    pub summary: &'static str,
+    /// Number of frames n.
+    pub frames: usize,
+    /// Number of vertices V.
+    pub vertices: usize,
+    /// Number of triangles F.
+    pub faces: usize,
+    /// What it is good for, in one line.
+    pub good_for: &'static str,
+    build: fn() -> Result<Sequence, SyntheticError>,
+}
+
+/// Why there is no such embedded sequence.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SyntheticError {
+    /// A name that is not in the catalogue.
+    #[error("no embedded sequence is called {name:?}; choose one of {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// Every name there is, separated by commas.
+        known: String,
+    },
+    /// A generator named a vertex that it did not make: a defect of this crate.
+    #[error("an embedded sequence came out with bad faces, please report it: {0}")]
+    Connectivity(#[from] ConnectivityError),
+    /// A generator made frames that are no sequence: a defect of this crate.
+    #[error("an embedded sequence came out with bad frames, please report it: {0}")]
+    Sequence(#[from] SequenceError),
+}
+
+/// Makes the embedded sequence of this name (with its `@`, as in [`catalogue`]).
+pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
+    match CATALOGUE.iter().find(|entry| entry.name == name) {
+        Some(entry) => (entry.build)(),
+        None => Err(SyntheticError::Unknown {
+            name: name.to_owned(),
+            known: known_names(),
+        }),
+    }
+}
+
+/// All embedded sequences, the full size of each before its small variant.
+pub fn catalogue() -> &'static [Entry] {
+    CATALOGUE
+}
+
+fn known_names() -> String {
+    let names: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
+    names.join(", ")
+}
+
+/// Stacks frames of points into a sequence over `faces`.
+fn assemble(
+    faces: Vec<[u32; 3]>,
+    frames: &[Vec<Vector3<f64>>],
+) -> Result<Sequence, SyntheticError> {
+    let vertex_count = frames.first().map_or(0, Vec::len);
+    let connectivity = Connectivity::new(vertex_count, faces)?;
+    let positions = frames
+        .iter()
+        .flatten()
+        .flat_map(|p| [p.x, p.y, p.z])
+        .collect();
+    Ok(Sequence::new(
+        Arc::new(connectivity),
+        frames.len(),
+        positions,
+    )?)
+}
+
+/// 0 before `from`, 1 after `to`, and 3u^2 - 2u^3 between.
+fn smoothstep(from: f64, to: f64, at: f64) -> f64 {
+    let u = ((at - from) / (to - from)).clamp(0.0, 1.0);
+    u * u * (3.0 - 2.0 * u)
+}
+
+const CATALOGUE: &[Entry] = &[
+    Entry {
+        name: "@bar",
+        summary: "a box bar that bends by up to 150 degrees and twists by 300",
+        frames: 60,
+        vertices: 2050,
+        faces: 4096,
+        good_for: "deformation gradients, known in closed form at every point and frame",
+        build: || bar::build(&bar::FULL),
+    },
+    Entry {
+        name: "@bar-small",
+        summary: "@bar with fewer vertices and frames",
+        frames: 30,
+        vertices: 260,
+        faces: 516,
+        good_for: "tests of gradients",
+        build: || bar::build(&bar::SMALL),
+    },
+    Entry {
+        name: "@roll",
+        summary: "a flat strip rolled up by 20 degrees a frame, to 700 degrees",
+        frames: 36,
+        vertices: 1331,
+        faces: 2400,
+        good_for: "isometry and rotations beyond a half turn: every triangle keeps its shape",
+        build: || roll::build(&roll::FULL, roll::FRAMES),
+    },
+    Entry {
+        name: "@roll-small",
+        summary: "@roll with fewer vertices",
+        frames: 36,
+        vertices: 164,
+        faces: 240,
+        good_for: "tests of isometry and of unwrapped rotations",
+        build: || roll::build(&roll::SMALL, roll::FRAMES),
+    },
+    Entry {
+        name: "@flag",
+        summary: "a cloth on a pole in a periodic wind, simulated",
+        frames: 100,
+        vertices: 3003,
+        faces: 5776,
+        good_for: "the size of the flag of Cashman & Hormann 2012, Table 1: F = 5776, n = 100, 9F + 3 = 51987",
+        build: || flag::build(&flag::FULL),
+    },
+    Entry {
+        name: "@flag-small",
+        summary: "@flag with a coarser cloth and fewer frames",
+        frames: 40,
+        vertices: 153,
+        faces: 256,
+        good_for: "tests on an open surface with a nearly periodic motion",
+        build: || flag::build(&flag::SMALL),
+    },
+    Entry {
+        name: "@gallop",
+        summary: "a quadruped that gallops in place for two similar cycles of 12 frames",
+        frames: 24,
+        vertices: 0,
+        faces: 0,
+        good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
+        build: || gallop::build(&gallop::FULL),
+    },
+    Entry {
+        name: "@gallop-small",
+        summary: "@gallop with a stouter animal of fewer vertices",
+        frames: 24,
+        vertices: 0,
+        faces: 0,
+        good_for: "tests of articulated motion and of transfer between different connectivities",
+        build: || gallop::build(&gallop::SMALL),
+    },
+    Entry {
+        name: "@jelly",
+        summary: "a soft animal lifted, swung, dropped, squashed and pulled by the head, simulated",
+        frames: 120,
+        vertices: 0,
+        faces: 0,
+        good_for: "large elastic deformation that never repeats, hard as the cow of Cashman & Hormann 2012, Figure 6",
+        build: || jelly::build(&jelly::FULL),
+    },
+    Entry {
+        name: "@jelly-small",
+        summary: "@jelly with fewer vertices, every third frame",
+        frames: 40,
+        vertices: 0,
+        faces: 0,
+        good_for: "tests of large elastic deformation",
+        build: || jelly::build(&jelly::SMALL),
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_has_the_size_that_it_states() {
+        for entry in catalogue() {
+            let sequence = embedded(entry.name).unwrap();
+            let mesh = sequence.connectivity();
+            assert_eq!(
+                (entry.frames, entry.vertices, entry.faces),
+                (
+                    sequence.frame_count(),
+                    mesh.vertex_count(),
+                    mesh.faces().len()
+                ),
+                "{}",
+                entry.name
+            );
+        }
+    }
+
+    #[test]
+    fn two_calls_give_the_same_bits() {
+        for entry in catalogue() {
+            let (a, b) = (embedded(entry.name).unwrap(), embedded(entry.name).unwrap());
+            assert_eq!(a.connectivity(), b.connectivity(), "{}", entry.name);
+            let bits =
+                |s: &Sequence| -> Vec<u64> { s.positions().iter().map(|x| x.to_bits()).collect() };
+            assert!(bits(&a) == bits(&b), "{}", entry.name);
+        }
+    }
+
+    #[test]
+    fn no_two_consecutive_frames_are_far_apart_or_equal() {
+        for entry in catalogue() {
+            let sequence = embedded(entry.name).unwrap();
+            let limit = if entry.name.ends_with("-small") {
+                0.16
+            } else {
+                0.1
+            };
+            for i in 1..sequence.frame_count() {
+                let step = checks::largest_step(&sequence, i) / checks::diagonal(sequence.frame(0));
+                assert!(step < limit, "{} frame {i}: {step}", entry.name);
+                assert!(step > 1e-6, "{} frame {i} repeats", entry.name);
+            }
+        }
+    }
+
+    #[test]
+    fn small_variants_are_small() {
+        for entry in catalogue().iter().filter(|e| e.name.ends_with("-small")) {
+            assert!(entry.vertices <= 700, "{}", entry.name);
+            assert!((24..=40).contains(&entry.frames), "{}", entry.name);
+            assert!(
+                catalogue()
+                    .iter()
+                    .any(|e| format!("{}-small", e.name) == entry.name)
+            );
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_lists_all_names() {
+        let message = embedded("flag").unwrap_err().to_string();
+        assert!(message.contains("\"flag\""), "{message}");
+        for entry in catalogue() {
+            assert!(message.contains(entry.name), "{message}");
+        }
+    }
+}
