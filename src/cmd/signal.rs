@@ -21,7 +21,7 @@ use crate::signal::pins::Pin;
 pub enum Signal {
     /// Fit time, pose and shape signals to a sequence
     #[command(
-        after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 -o gallop.npz --json fit.json"
+        after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json"
     )]
     Fit(FitVerb),
     /// Frames of a representation at any times
@@ -56,8 +56,8 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// How knots average parameters: literal as printed in the paper's source, or symmetric
-    #[arg(long, default_value = "literal", value_name = "RULE")]
+    /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
+    #[arg(long, default_value = "symmetric", value_name = "RULE")]
     knots: String,
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]

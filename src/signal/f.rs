@@ -10,6 +10,12 @@ use crate::linalg::dense::{FactorError, thin_svd};
 
 /// Pivots, or singular values, below this share of the largest count as 0: the data leave freedom there.
 const DEFICIENT: f64 = 1e-11;
+/// Control points this many times farther out than the data.
+const FAR: f64 = 10.0;
+
+fn reach(points: &[Point]) -> f64 {
+    points.as_flattened().iter().fold(0.0, |reach, x| x.abs().max(reach))
+}
 
 /// f~(u) = sum_j B_j(u) f_j with cubic B-splines.
 #[derive(Clone, Debug, PartialEq)]
@@ -233,7 +239,13 @@ fn banded(basis: &Basis, rows: &[Local], points: &[Point], freedom: usize) -> Op
         for ((first, row), b) in ends.iter().zip(end) {
             system.add(*first, *row, b);
         }
-        (system.pivot_ratio() > DEFICIENT).then(|| system.solve())
+        if system.pivot_ratio() <= DEFICIENT {
+            return None;
+        }
+        let control = system.solve();
+        // Near deficiency shows in control points far from the data; only then is the condition worth its price.
+        let suspicious = reach(&control) > FAR * reach(points);
+        (!suspicious || system.reciprocal_condition() > DEFICIENT).then_some(control)
     };
     let mut control = solve(&|i| points[i], [[0.0; 2]; 2])?;
     if freedom > 0 {

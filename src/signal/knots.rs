@@ -7,11 +7,12 @@ use thiserror::Error;
 /// How interior knots average the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KnotRule {
-    /// Piegl & Tiller's (9.68), (9.69) as printed: the rule of the paper's Table 1, and the default, so that results compare with it.
-    #[default]
+    /// Piegl & Tiller's (9.68), (9.69) as printed: what the rows of the paper's Table 1 are compared with. Near k = n its system is singular to
+    /// rounding (condition 1e20 on the cow).
     Literal,
-    /// The variant that treats both ends alike: it degenerates to interpolation by itself, keeps the Schoenberg-Whitney conditions, and lowers (7) and
-    /// (2) (reading 2).
+    /// The variant that treats both ends alike. The default: it degenerates to interpolation by itself and its system is well conditioned for every k
+    /// (reading 2); against the literal rule (2) is halved on the cow and 1 to 5% higher on horse and samba.
+    #[default]
     Symmetric,
 }
 
