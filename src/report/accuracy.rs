@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::format::number;
+use super::format::{chosen, number};
 use super::markup::{Cell, Group, Table, escape, name};
 use super::order::{distinct, engines};
 use super::verdicts::{badge, class, symbol};
@@ -74,7 +74,7 @@ fn line(index: &Index, case: &str, quantity: &str, across: &[&str]) -> Vec<Cell>
 /// The tolerance that all engines share; each of them, where they do not.
 fn tolerance(found: &[Option<&AccuracyRow>]) -> Cell {
     let held = found.iter().flatten().filter_map(|r| r.tolerance);
-    let held: Vec<String> = held.map(number).collect();
+    let held: Vec<String> = held.map(chosen).collect();
     let unique = distinct(held.iter().map(String::as_str));
     match unique.is_empty() {
         true => Cell::classed("n faint", "reported only"),

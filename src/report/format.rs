@@ -29,6 +29,19 @@ pub(super) fn number(x: f64) -> String {
     }
 }
 
+/// As [`number`], without idle zeros: `1e-9`, `0.43`. For tolerances, which people chose.
+pub(super) fn chosen(x: f64) -> String {
+    let text = number(x);
+    let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
+    match digits.contains('.') {
+        true => format!(
+            "{}{power}",
+            digits.trim_end_matches('0').trim_end_matches('.')
+        ),
+        false => text,
+    }
+}
+
 /// Three significant digits and a unit: `845 ns`, `1.23 ms`, `75.0 s`.
 pub(super) fn seconds(x: f64) -> String {
     let x = rounded(x);
@@ -80,6 +93,21 @@ mod tests {
         ];
         for (x, expected) in cases {
             assert_eq!(number(x), expected);
+        }
+    }
+
+    #[test]
+    fn tolerances_have_no_idle_zeros() {
+        let cases = [
+            (1e-9, "1e-9"),
+            (0.43, "0.43"),
+            (2.0, "2"),
+            (200.0, "200"),
+            (1.5e-6, "1.5e-6"),
+            (0.0, "0"),
+        ];
+        for (x, expected) in cases {
+            assert_eq!(chosen(x), expected);
         }
     }
 

@@ -31,7 +31,7 @@ pub fn html(record: &Record, published: &[PublishedRow]) -> String {
          <title>meshseq report: {}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
          <header>\n<h1>meshseq report</h1>\n{headline}{}{}</header>\n\
          <nav aria-label=\"Sections\"><ul>{links}</ul></nav>\n<main>\n{body}</main>\n</body>\n</html>\n",
-        strip_tags(&headline),
+        strip_tags(&headline).trim(),
         tally(&record.agreement),
         how_to_read(),
     )

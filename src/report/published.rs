@@ -15,8 +15,11 @@ pub struct PublishedRow {
     pub space: String,
     /// Numbers in one frame: 3V in vertex space, 9F + 3 in gradient space.
     pub d: usize,
+    /// Control points of the time signal.
     pub k: usize,
+    /// Sites of the pose signal.
     pub l: usize,
+    /// Dimensions of the shape signal.
     pub m: usize,
     /// Frames.
     pub n: usize,

@@ -38,7 +38,6 @@ fn table(stage: &str, rows: &[&TimingRow], cases: &[&str]) -> String {
         Cell::text("engine"),
         Cell::number("median"),
         Cell::number("MAD"),
-        Cell::number("least"),
         Cell::number("ratio to rust"),
         Cell::number("samples × calls"),
     ];
@@ -76,7 +75,6 @@ fn line(row: &TimingRow, published: bool) -> Vec<Cell> {
         Cell::text(escape(&row.engine)),
         Cell::number(seconds(row.median_seconds)),
         Cell::number(seconds(row.mad_seconds)),
-        Cell::number(seconds(row.least_seconds)),
         Cell::number(times(row.ratio_to_rust)),
         Cell::number(format!("{} × {}", row.samples, row.batch)),
     ];

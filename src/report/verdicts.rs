@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::format::{count, number};
+use super::format::{chosen, count, number};
 use super::markup::{Cell, Group, Table, escape, name};
 use super::order::{distinct, engines};
 use crate::harness::record::{AgreementRow, Verdict};
@@ -141,7 +141,7 @@ fn explanation(row: &AgreementRow) -> String {
         text += &format!(" = {}", number(value));
     }
     if let Some(tolerance) = row.tolerance {
-        text += &format!(", tolerance {}", number(tolerance));
+        text += &format!(", tolerance {}", chosen(tolerance));
     }
     if !row.reason.is_empty() {
         text += &format!(" ({})", row.reason);
@@ -162,7 +162,8 @@ pub(super) fn messages(rows: &[AgreementRow]) -> String {
         items += &messages_of(verdict, rows.iter().filter(told));
     }
     match items.as_str() {
-        "" => "<p>Nothing to tell: every engine that was asked agreed.</p>\n".into(),
+        "" if rows.is_empty() => "<p>Nothing was asked.</p>\n".into(),
+        "" => "<p>Nothing: every engine that was asked agreed.</p>\n".into(),
         _ => format!("<dl class=\"messages\">\n{items}</dl>\n"),
     }
 }
@@ -216,7 +217,7 @@ pub(super) fn tolerances(rows: &[AgreementRow]) -> String {
         Some([
             r.stage.clone(),
             quantity.clone(),
-            number(tolerance),
+            chosen(tolerance),
             r.reason.clone(),
         ])
     };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use super::drawable;
+use super::{drawable, drawable_positive};
 
 /// Decades that a logarithmic axis shows at most; what is smaller stands on its lower edge.
 const DECADES: f64 = 18.0;
@@ -16,6 +16,13 @@ pub(super) struct Axis {
     high: f64,
     logarithmic: bool,
     ticks: Vec<(f64, String)>,
+}
+
+/// Where a value beyond an axis stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edge {
+    Low,
+    High,
 }
 
 /// Least and greatest of what can be drawn.
@@ -119,7 +126,7 @@ impl Axis {
         most: usize,
         label: impl Fn(f64) -> String,
     ) -> Self {
-        let positive = values.filter(|&x| x > 1e-150);
+        let positive = values.filter(|&x| drawable_positive(x));
         let (low, high) = extent(positive).unwrap_or((1.0, 10.0));
         let high = high.log10();
         let low = low.log10().max(high - DECADES);
@@ -149,9 +156,14 @@ impl Axis {
         self.high
     }
 
-    /// Whether a logarithmic axis has no place for `x` but its lower edge.
-    pub(super) fn on_edge(&self, x: f64) -> bool {
-        self.logarithmic && x < self.low
+    /// The edge of a logarithmic axis that `x` is put on because it lies beyond; none where it lies within.
+    pub(super) fn edge(&self, x: f64) -> Option<Edge> {
+        match x {
+            _ if !self.logarithmic => None,
+            x if x < self.low => Some(Edge::Low),
+            x if x > self.high => Some(Edge::High),
+            _ => None,
+        }
     }
 
     /// Where `x` stands between the ends, from 0 to 1; what is outside stands on the nearer end.
@@ -206,7 +218,7 @@ impl ValueFormatter<f64> for Axis {
 /// A power of ten such as `10⁻⁴`; near 1, and for what is no power, a plain number such as `0.05` or `2e-5`.
 pub(super) fn power_label(x: f64) -> String {
     let exponent = x.log10();
-    if (-2.001..3.001).contains(&exponent) {
+    if (-3.001..3.001).contains(&exponent) {
         let decimals = -(exponent + 1e-6).floor();
         return format!("{x:.*}", decimals.max(0.0) as usize);
     }
@@ -254,7 +266,11 @@ mod tests {
     #[test]
     fn zero_and_less_stand_on_the_lower_edge() {
         let axis = Axis::logarithmic([0.0, -1.0, 1e-300, 1e-3, 1.0].into_iter(), 6, power_label);
-        assert!(axis.on_edge(0.0) && axis.on_edge(-1.0) && !axis.on_edge(1e-3));
+        assert_eq!(
+            [0.0, -1.0, 1e-3, 1e9].map(|x| axis.edge(x)),
+            [Some(Edge::Low), Some(Edge::Low), None, Some(Edge::High)]
+        );
+        assert_eq!(axis.map(&1e9, (0, 100)), 100);
         assert_eq!(axis.map(&0.0, (0, 100)), 0);
         assert!(axis.map(&1e-3, (0, 100)) > 0);
     }

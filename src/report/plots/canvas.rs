@@ -5,14 +5,14 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::axis::Axis;
+use super::axis::{Axis, Edge};
 use super::legend::{self, Entry};
 use super::{GREY, INK, PALE, PlotError};
 use crate::report::markup::escape;
 
 /// plotters draws on whole pixels. Pictures are drawn this much larger and shown at their own size, so that curves are smooth.
 pub(super) const FINE: i32 = 10;
-/// Height of the letters in a picture of 560 pixels' width.
+/// Height of letters in pixels: large enough for a picture of 500 pixels to be read on a phone of 390.
 pub(super) const LETTERS: i32 = 14;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -28,8 +28,8 @@ pub(super) enum Mark {
     Square,
     Diamond,
     Triangle,
-    /// A triangle that hangs: for what stands on the edge of an axis.
-    OnEdge,
+    /// An open triangle that points out of the plane: for what stands on the edge of an axis.
+    OnEdge(Edge),
     Line,
     Dashes,
 }
@@ -172,8 +172,7 @@ impl Canvas<'_, '_> {
     /// A dashed line through places.
     pub(super) fn dashes(&self, places: Vec<Place>, colour: RGBColor) -> Result<(), PlotError> {
         let style = colour.stroke_width(FINE as u32);
-        let line =
-            DashedPathElement::new(places.into_iter(), 5 * FINE as u32, 4 * FINE as u32, style);
+        let line = DashedPathElement::new(places, 5 * FINE as u32, 4 * FINE as u32, style);
         self.root.draw(&line).map_err(failed)
     }
 
@@ -204,7 +203,7 @@ impl Canvas<'_, '_> {
                     .map_err(failed)?;
                 self.root.draw(&Circle::new(at, r, style)).map_err(failed)
             }
-            Mark::OnEdge => {
+            Mark::OnEdge(_) => {
                 let mut corners = corners(mark, at, r);
                 self.root
                     .draw(&Polygon::new(corners.clone(), WHITE.filled()))
@@ -250,7 +249,8 @@ fn corners(mark: Mark, (x, y): Place, r: i32) -> Vec<Place> {
             (x - w, y + w),
         ],
         Mark::Triangle => vec![(x, y - r), (x + r, y + w), (x - r, y + w)],
-        Mark::OnEdge => vec![(x, y), (x + w, y - r - w), (x - w, y - r - w)],
+        Mark::OnEdge(Edge::Low) => vec![(x, y), (x + w, y - r - w), (x - w, y - r - w)],
+        Mark::OnEdge(Edge::High) => vec![(x, y), (x + w, y + r + w), (x - w, y + r + w)],
         _ => vec![(x, y - r), (x + r, y), (x, y + r), (x - r, y)],
     }
 }

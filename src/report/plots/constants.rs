@@ -3,10 +3,14 @@
 use super::axis::{Axis, power_label};
 use super::canvas::{Canvas, Frame, Mark, chart};
 use super::{
-    BLUE, GREEN, INK, Picture, PlotError, VERMILION, drawable, note_left_out, note_on_edge,
+    BLUE, GREEN, INK, Picture, PlotError, VERMILION, drawable, drawable_positive, note_left_out,
+    note_on_edge,
 };
 use crate::harness::record::FitFigures;
 use plotters::style::RGBColor;
+
+/// Per cent of the diagonal from which on an error tells nothing but that the fit failed; the axis is not stretched for it.
+const NONSENSE: f64 = 1e4;
 
 /// One constant: its values with their errors, the range it can have and the value it had.
 struct Series<'a> {
@@ -69,7 +73,7 @@ pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
         title: "Error against k, l and m".into(),
         look: format!(
             "Look for the flat ends: a constant whose line is flat beyond its ring has more than it needs, and the error comes from the \
-             other two. Each runs over its own range, 4 to n + 2 for k, 3 to n for l, 0 to n - 1 for m; rings mark k = {}, l = {}, m = {}.",
+             other two. Each runs over its own range, 4 to n+2 for k, 3 to n for l, 0 to n−1 for m; rings mark k = {}, l = {}, m = {}.",
             figures.k, figures.l, figures.m
         ),
         svg,
@@ -82,24 +86,28 @@ pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
 
 fn draw(figures: &FitFigures, series: &[Series; 3]) -> (Result<String, PlotError>, usize) {
     let errors = || series.iter().flat_map(|s| s.drawable().map(|p| p.1));
-    if !errors().any(|e| e > 0.0) {
+    if !errors().any(drawable_positive) {
         let none = PlotError::NothingToDraw("no error above zero against k, l or m");
         return (Err(none), 0);
     }
-    let y = Axis::logarithmic(errors(), 7, power_label);
-    let on_edge = errors().filter(|&e| y.on_edge(e)).count();
+    let sensible = || errors().filter(|&e| e < NONSENSE);
+    let y = match sensible().any(drawable_positive) {
+        true => Axis::logarithmic(sensible(), 7, power_label),
+        false => Axis::logarithmic(errors(), 7, power_label),
+    };
+    let on_edge = errors().filter(|&e| y.edge(e).is_some()).count();
     let label = format!(
         "Relative error of {} against the constants k, l and m, each over its own range",
         figures.case
     );
     let frame = Frame {
-        size: (560, 380),
+        size: (480, 350),
         label: &label,
         x: Axis::between((-3.0, 103.0), 6),
         y: y.clone(),
         x_title: "place in the constant's own range, %",
         y_title: "relative RMS error (2), %",
-        sides: (76, 0),
+        sides: (72, 0),
         legend: &[
             (Mark::Dot, BLUE, "k, control points"),
             (Mark::Triangle, GREEN, "l, sites"),
@@ -126,11 +134,7 @@ fn draw_series(canvas: &Canvas, series: &Series, y: &Axis) -> Result<(), PlotErr
     }
     let size = if points.len() > 40 { 2.4 } else { 3.8 };
     for point in &points {
-        let mark = if y.on_edge(point.1) {
-            Mark::OnEdge
-        } else {
-            series.mark
-        };
+        let mark = y.edge(point.1).map_or(series.mark, Mark::OnEdge);
         canvas.mark(mark, place(point), size, series.colour)?;
     }
     Ok(())

@@ -46,13 +46,13 @@ fn draw(figures: &FitFigures, kept: &[(usize, f64)]) -> Result<String, PlotError
         worst + 1
     );
     let frame = Frame {
-        size: (560, 380),
+        size: (480, 350),
         label: &label,
         x: Axis::counts(1, figures.frame_errors.len(), 8),
         y: Axis::from_zero(kept.iter().map(|k| k.1 * 1.05), 6),
         x_title: "frame",
         y_title: "RMS distance / diagonal, %",
-        sides: (76, 0),
+        sides: (72, 0),
         legend: &[
             (Mark::Dot, BLUE, "frame"),
             (Mark::Square, GREEN, "frame that is a site"),

@@ -53,6 +53,11 @@ pub(super) fn drawable(x: f64) -> bool {
     x.is_finite() && x.abs() < 1e150
 }
 
+/// Whether a number has a place of its own on a logarithmic axis: drawable, and not zero or next to it.
+pub(super) fn drawable_positive(x: f64) -> bool {
+    drawable(x) && x > 1e-150
+}
+
 /// A note on numbers that could not be drawn; none when there were none.
 pub(super) fn note_left_out(left_out: usize, of: usize, what: &str) -> Option<String> {
     (left_out > 0).then(|| {
@@ -65,6 +70,6 @@ pub(super) fn note_left_out(left_out: usize, of: usize, what: &str) -> Option<St
 /// A note on numbers that a logarithmic axis has no place for; none when there were none.
 pub(super) fn note_on_edge(on_edge: usize, what: &str) -> Option<String> {
     (on_edge > 0).then(|| {
-        format!("{on_edge} of the {what} are zero, negative or too small for the axis; they stand on its lower edge as open triangles.")
+        format!("Beyond the axis, drawn on its edge as open triangles: {on_edge} of the {what} (zero, negative, or too small or great).")
     })
 }

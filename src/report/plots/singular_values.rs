@@ -4,7 +4,10 @@ use plotters::style::text_anchor::HPos;
 
 use super::axis::{Axis, power_label};
 use super::canvas::{Frame, LETTERS, Mark, chart};
-use super::{BLUE, GREY, Picture, PlotError, VERMILION, drawable, note_left_out, note_on_edge};
+use super::{
+    BLUE, GREY, Picture, PlotError, VERMILION, drawable, drawable_positive, note_left_out,
+    note_on_edge,
+};
 use crate::harness::record::FitFigures;
 
 /// The singular values of the centred frames, with the m that were kept.
@@ -31,12 +34,12 @@ pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
 }
 
 fn draw(figures: &FitFigures, kept: &[(usize, f64)]) -> (Result<String, PlotError>, usize) {
-    if !kept.iter().any(|k| k.1 > 0.0) {
+    if !kept.iter().any(|k| drawable_positive(k.1)) {
         let none = Err(PlotError::NothingToDraw("no singular value above zero"));
         return (none, 0);
     }
     let y = Axis::logarithmic(kept.iter().map(|k| k.1), 7, power_label);
-    let on_edge = kept.iter().filter(|k| y.on_edge(k.1)).count();
+    let on_edge = kept.iter().filter(|k| y.edge(k.1).is_some()).count();
     let label = format!(
         "Singular values of {}, falling over {} dimensions, of which {} are kept",
         figures.case,
@@ -44,13 +47,13 @@ fn draw(figures: &FitFigures, kept: &[(usize, f64)]) -> (Result<String, PlotErro
         figures.m
     );
     let frame = Frame {
-        size: (560, 380),
+        size: (480, 350),
         label: &label,
         x: Axis::counts(1, figures.singular_values.len(), 8),
         y: y.clone(),
         x_title: "dimension",
         y_title: "singular value, units of the mesh",
-        sides: (76, 0),
+        sides: (72, 0),
         legend: &[(Mark::Dot, BLUE, "kept"), (Mark::Ring, GREY, "left out")],
     };
     let radius = if kept.len() > 80 { 2.0 } else { 3.6 };
@@ -60,8 +63,8 @@ fn draw(figures: &FitFigures, kept: &[(usize, f64)]) -> (Result<String, PlotErro
         canvas.dashes(vec![(cut, top), (cut, bottom)], VERMILION)?;
         for &(i, s) in kept {
             let at = canvas.at([(i + 1) as f64, s]);
-            match (y.on_edge(s), i < figures.m) {
-                (true, _) => canvas.mark(Mark::OnEdge, at, radius, GREY)?,
+            match (y.edge(s), i < figures.m) {
+                (Some(edge), _) => canvas.mark(Mark::OnEdge(edge), at, radius, GREY)?,
                 (_, true) => canvas.mark(Mark::Dot, at, radius, BLUE)?,
                 (_, false) => canvas.mark(Mark::Ring, at, radius, GREY)?,
             }

@@ -10,47 +10,127 @@ use super::{BLUE, GREEN, GREY, INK, PALE_VERMILION, Picture, PlotError, drawable
 use crate::harness::record::FitFigures;
 
 /// Pixels of the picture's width, and those that its sides take from it.
-const WIDTH: i32 = 620;
+const WIDTH: i32 = 520;
 const SIDES: i32 = 90;
 /// Pixels that legend and axis take from the height.
 const ENDS: i32 = 112;
 /// The plane is never flatter nor higher than this.
-const HEIGHTS: (f64, f64) = (200.0, 560.0);
+const HEIGHTS: (f64, f64) = (180.0, 480.0);
 /// Frames that are numbered, at most.
 const NUMBERED: usize = 16;
 
+/// How far beyond the box of the positions the picture reaches at most, as a share of the box's longer side.
+const BEYOND: f64 = 0.6;
+
 /// The curve f with f(i) at the frames, the positions p_i, the sites and the control polygon.
 pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
-    let all = [
+    let shown = Shown::new(figures);
+    let all = shown.all();
+    let total: usize = all.iter().map(|p| p.len()).sum();
+    let kept: usize = all.iter().flat_map(|p| p.iter().flatten()).count();
+    let given = [
         &figures.curve,
         &figures.frame_points,
         &figures.positions,
         &figures.control,
     ];
-    let total: usize = all.iter().map(|p| p.len()).sum();
-    let kept: usize = all.iter().map(|p| finite(p).count()).sum();
+    let not_numbers = total - given.iter().map(|p| finite(p).count()).sum::<usize>();
+    let beyond = total - kept - not_numbers;
+    let note_beyond = (beyond > 0).then(|| {
+        format!("{beyond} of {total} points lie far from every position and are left out; the curve is broken there.")
+    });
     Picture {
         title: "Time signal over the pose plane".into(),
-        look: "Look for the path of the motion: frames near each other here have similar shapes, a cycle closes on itself, and the distance \
-               from a diamond to its dot is what the time signal smooths away. Small numbers count frames from 1."
+        look: "Look for the path of the motion: frames near each other here have similar shapes, a cycle closes on itself, and the line from a \
+               diamond to its dot is what the time signal smooths away. The numbers count frames from 1."
             .into(),
-        svg: draw(figures),
-        notes: note_left_out(total - kept, total, "points")
+        svg: draw(figures, &shown),
+        notes: note_left_out(not_numbers, total, "points")
             .into_iter()
+            .chain(note_beyond)
             .collect(),
     }
 }
 
-fn finite(points: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> {
-    let kept = points.iter().copied();
-    kept.filter(|p| drawable(p[0]) && drawable(p[1]))
+fn usable(p: [f64; 2]) -> bool {
+    p.iter().all(|&x| drawable(x))
 }
 
-fn draw(figures: &FitFigures) -> Result<String, PlotError> {
-    if finite(&figures.frame_points).next().is_none() && finite(&figures.curve).next().is_none() {
+fn finite(points: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> {
+    points.iter().copied().filter(|&p| usable(p))
+}
+
+/// What is drawn: points in their order, none where one is not a number or far from every position.
+struct Shown {
+    curve: Vec<Option<[f64; 2]>>,
+    frames: Vec<Option<[f64; 2]>>,
+    positions: Vec<Option<[f64; 2]>>,
+    control: Vec<Option<[f64; 2]>>,
+}
+
+impl Shown {
+    fn new(figures: &FitFigures) -> Self {
+        let sets = [&figures.positions, &figures.frame_points, &figures.curve];
+        let base = sets.iter().find(|p| finite(p).next().is_some());
+        let limits = base.map(|points| limits(points));
+        let within = |p: [f64; 2]| {
+            let [low, high] = limits?;
+            let inside = (0..2).all(|a| (low[a]..=high[a]).contains(&p[a]));
+            (usable(p) && inside).then_some(p)
+        };
+        let shown = |points: &[[f64; 2]]| points.iter().map(|&p| within(p)).collect();
+        Self {
+            curve: shown(&figures.curve),
+            frames: shown(&figures.frame_points),
+            positions: shown(&figures.positions),
+            control: shown(&figures.control),
+        }
+    }
+
+    fn all(&self) -> [&[Option<[f64; 2]>]; 4] {
+        [&self.curve, &self.frames, &self.positions, &self.control]
+    }
+}
+
+/// The lower and the upper corner of what is shown around these points.
+fn limits(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for p in finite(points) {
+        for a in 0..2 {
+            low[a] = low[a].min(p[a]);
+            high[a] = high[a].max(p[a]);
+        }
+    }
+    let side = (high[0] - low[0]).max(high[1] - low[1]);
+    // All positions in one place: whatever is drawn, it is drawn around them.
+    let reach = if side > 0.0 {
+        BEYOND * side
+    } else {
+        f64::INFINITY
+    };
+    [low.map(|x| x - reach), high.map(|x| x + reach)]
+}
+
+/// The runs of points between those that are left out.
+fn runs(canvas: &Canvas, points: &[Option<[f64; 2]>]) -> Vec<Vec<Place>> {
+    points
+        .split(|p| p.is_none())
+        .map(|run| run.iter().flatten().map(|&p| canvas.at(p)).collect())
+        .collect()
+}
+
+fn draw(figures: &FitFigures, shown: &Shown) -> Result<String, PlotError> {
+    if shown
+        .curve
+        .iter()
+        .chain(&shown.frames)
+        .flatten()
+        .next()
+        .is_none()
+    {
         return Err(PlotError::NothingToDraw("no points of a time signal"));
     }
-    let (x, y, height) = equal_axes(figures);
+    let (x, y, height) = equal_axes(shown);
     let label = format!(
         "Time signal of {}: a curve over the pose plane through {} frames, with {} sites",
         figures.case,
@@ -74,23 +154,25 @@ fn draw(figures: &FitFigures) -> Result<String, PlotError> {
         ],
     };
     chart(&frame, |canvas| {
-        polygon(canvas, &figures.control)?;
-        curve(canvas, &figures.curve)?;
-        positions(canvas, figures)?;
-        frames(canvas, &figures.frame_points)
+        polygon(canvas, &shown.control)?;
+        let on_curve = curve(canvas, &shown.curve)?;
+        positions(canvas, shown, &figures.sites)?;
+        frames(canvas, &shown.frames, &on_curve)
     })
 }
 
 /// Axes on which a unit is as long across as up, and the height of the picture that they need.
-fn equal_axes(figures: &FitFigures) -> (Axis, Axis, i32) {
-    let points = || {
-        finite(&figures.curve)
-            .chain(finite(&figures.frame_points))
-            .chain(finite(&figures.positions))
-            .chain(finite(&figures.control))
+fn equal_axes(shown: &Shown) -> (Axis, Axis, i32) {
+    let along = |a: usize| {
+        shown
+            .all()
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(move |p| p[a])
     };
-    let x = Axis::padded(points().map(|p| p[0]), 0.05, 6);
-    let y = Axis::padded(points().map(|p| p[1]), 0.05, 6);
+    let x = Axis::padded(along(0), 0.05, 6);
+    let y = Axis::padded(along(1), 0.05, 6);
     let (wide, high) = (x.high() - x.low(), y.high() - y.low());
     let across = f64::from(WIDTH - SIDES);
     let up = (across * high / wide).clamp(HEIGHTS.0, HEIGHTS.1);
@@ -103,17 +185,30 @@ fn equal_axes(figures: &FitFigures) -> (Axis, Axis, i32) {
     (axes.0, axes.1, up.round() as i32 + ENDS)
 }
 
-fn polygon(canvas: &Canvas, control: &[[f64; 2]]) -> Result<(), PlotError> {
-    let places: Vec<Place> = finite(control).map(|p| canvas.at(p)).collect();
-    if places.len() > 1 {
-        canvas.dashes(places, PALE_VERMILION)?;
+fn polygon(canvas: &Canvas, control: &[Option<[f64; 2]>]) -> Result<(), PlotError> {
+    for run in runs(canvas, control) {
+        if run.len() > 1 {
+            canvas.dashes(run, PALE_VERMILION)?;
+        }
     }
     Ok(())
 }
 
-/// The curve, without the points that would fall onto the ones before.
-fn curve(canvas: &Canvas, points: &[[f64; 2]]) -> Result<(), PlotError> {
-    let mut places: Vec<Place> = finite(points).map(|p| canvas.at(p)).collect();
+/// Draws the curve without the points that would fall onto the ones before, and answers those that remain.
+fn curve(canvas: &Canvas, points: &[Option<[f64; 2]>]) -> Result<Vec<Place>, PlotError> {
+    let mut drawn = Vec::new();
+    for run in runs(canvas, points) {
+        let run = thinned(run);
+        drawn.extend_from_slice(&run);
+        if run.len() > 1 {
+            canvas.line(run, BLUE, 2.0)?;
+        }
+    }
+    Ok(drawn)
+}
+
+/// The first and the last place, and of those between only the ones that are not where the one before is.
+fn thinned(mut places: Vec<Place>) -> Vec<Place> {
     let last = places.last().copied();
     let mut before = None;
     places.retain(|&place| {
@@ -123,11 +218,8 @@ fn curve(canvas: &Canvas, points: &[[f64; 2]]) -> Result<(), PlotError> {
         }
         far
     });
-    places.extend(last);
-    match places.len() {
-        0 | 1 => Ok(()),
-        _ => canvas.line(places, BLUE, 2.0),
-    }
+    places.extend(last.filter(|l| before != Some(*l)));
+    places
 }
 
 /// How far apart two places are, the longer of across and down.
@@ -136,16 +228,14 @@ fn reach(a: Place, b: Place) -> i32 {
 }
 
 /// Positions, each tied to its frame's point on the curve.
-fn positions(canvas: &Canvas, figures: &FitFigures) -> Result<(), PlotError> {
-    let sites: HashSet<usize> = figures.sites.iter().copied().collect();
-    let size = size(figures.positions.len());
-    for (i, &p) in figures.positions.iter().enumerate() {
-        if finite(&[p]).next().is_none() {
+fn positions(canvas: &Canvas, shown: &Shown, sites: &[usize]) -> Result<(), PlotError> {
+    let sites: HashSet<usize> = sites.iter().copied().collect();
+    let size = size(shown.positions.len());
+    for (i, position) in shown.positions.iter().enumerate() {
+        let Some(at) = position.map(|p| canvas.at(p)) else {
             continue;
-        }
-        let at = canvas.at(p);
-        let on_curve = figures.frame_points.get(i).map(std::slice::from_ref);
-        if let Some(f) = on_curve.and_then(|f| finite(f).next()) {
+        };
+        if let Some(f) = shown.frames.get(i).copied().flatten() {
             canvas.line(vec![at, canvas.at(f)], GREY, 0.8)?;
         }
         match sites.contains(&i) {
@@ -164,57 +254,71 @@ fn size(points: usize) -> f64 {
     }
 }
 
-fn frames(canvas: &Canvas, points: &[[f64; 2]]) -> Result<(), PlotError> {
-    let numbered: Vec<(usize, Place)> = points
+fn frames(canvas: &Canvas, points: &[Option<[f64; 2]>], curve: &[Place]) -> Result<(), PlotError> {
+    let places: Vec<(usize, Place)> = points
         .iter()
         .enumerate()
-        .filter(|(_, p)| finite(&[**p]).next().is_some())
-        .map(|(i, p)| (i, canvas.at(*p)))
+        .filter_map(|(i, p)| Some((i, canvas.at((*p)?))))
         .collect();
-    for &(_, at) in &numbered {
+    for &(_, at) in &places {
         canvas.mark(Mark::Dot, at, size(points.len()), BLUE)?;
     }
-    let places: Vec<Place> = numbered.iter().map(|n| n.1).collect();
-    for (i, at) in labels(&numbered, &places, points.len(), canvas.plane()) {
-        canvas.text(&(i + 1).to_string(), at, HPos::Center, LETTERS - 1, INK)?;
+    let every = points.len().div_ceil(NUMBERED).max(1);
+    let is_numbered = |i: usize| i.is_multiple_of(every) || i + 1 == points.len();
+    let mut desk = Desk {
+        plane: canvas.plane(),
+        points: places.iter().map(|p| p.1).collect(),
+        curve,
+        written: Vec::new(),
+    };
+    for (i, at) in places.into_iter().filter(|p| is_numbered(p.0)) {
+        let number = (i + 1).to_string();
+        if let Some(place) = desk.write(at, &number) {
+            canvas.text(&number, place, HPos::Center, LETTERS - 1, INK)?;
+        }
     }
     Ok(())
 }
 
-/// Where to write the numbers of some frames, so that no two overlap and none hides a point; frames without such a place stay unnumbered.
-fn labels(
-    numbered: &[(usize, Place)],
-    points: &[Place],
-    frames: usize,
-    [left, right, top, bottom]: [i32; 4],
-) -> Vec<(usize, Place)> {
-    let every = frames.div_ceil(NUMBERED).max(1);
-    let mut written: Vec<(usize, Place)> = Vec::new();
-    for &(i, at) in numbered {
-        if i % every != 0 && i + 1 != frames {
-            continue;
-        }
-        let half = (
-            text_width(&(i + 1).to_string(), LETTERS) * FINE / 2,
-            7 * FINE,
-        );
-        let within = |p: &Place| {
-            p.0 - half.0 > left
-                && p.0 + half.0 < right
-                && p.1 - half.1 > top
-                && p.1 + half.1 < bottom
-        };
-        let free = |p: &Place| {
-            let clear = |q: &Place, margin: i32| {
-                (p.0 - q.0).abs() > half.0 + margin || (p.1 - q.1).abs() > half.1 + margin
-            };
-            points.iter().all(|q| clear(q, 3 * FINE))
-                && written.iter().all(|(_, q)| clear(q, 10 * FINE))
-        };
-        let place = around(at).into_iter().find(|p| within(p) && free(p));
-        written.extend(place.map(|p| (i, p)));
+/// Where numbers can be written: none over another nor over a point, and off the curve where there is room.
+struct Desk<'a> {
+    plane: [i32; 4],
+    points: Vec<Place>,
+    curve: &'a [Place],
+    written: Vec<Place>,
+}
+
+impl Desk<'_> {
+    /// A place near `at` for a number, now taken; none where there is no room, and the frame stays unnumbered.
+    fn write(&mut self, at: Place, number: &str) -> Option<Place> {
+        let half = (text_width(number, LETTERS) * FINE / 2, 7 * FINE);
+        let places: Vec<Place> = around(at)
+            .into_iter()
+            .filter(|&p| self.is_free(p, half))
+            .collect();
+        let clear = places
+            .iter()
+            .find(|&&p| self.curve.iter().all(|&q| apart(p, q, half, 0)));
+        let place = clear.or(places.first()).copied();
+        self.written.extend(place);
+        place
     }
-    written
+
+    fn is_free(&self, p: Place, half: (i32, i32)) -> bool {
+        let [left, right, top, bottom] = self.plane;
+        let inside = p.0 - half.0 > left
+            && p.0 + half.0 < right
+            && p.1 - half.1 > top
+            && p.1 + half.1 < bottom;
+        inside
+            && self.points.iter().all(|&q| apart(p, q, half, 3 * FINE))
+            && self.written.iter().all(|&q| apart(p, q, half, 10 * FINE))
+    }
+}
+
+/// Whether a place lies outside the box of half sides `half` around another, by a margin.
+fn apart(p: Place, q: Place, half: (i32, i32), margin: i32) -> bool {
+    (p.0 - q.0).abs() > half.0 + margin || (p.1 - q.1).abs() > half.1 + margin
 }
 
 /// Sixteen places around a point, near ones first.

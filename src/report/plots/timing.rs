@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use plotters::style::RGBColor;
 use plotters::style::text_anchor::HPos;
+use plotters::style::{RGBColor, WHITE};
 
 use super::axis::Axis;
 use super::canvas::{Canvas, FINE, Frame, LETTERS, Mark, chart, text_width};
-use super::{BLUE, GREY, INK, PURPLE, Picture, PlotError, VERMILION, drawable};
+use super::legend::Entry;
+use super::{BLUE, INK, PURPLE, Picture, PlotError, VERMILION, drawable, drawable_positive};
 use crate::harness::record::{SampleRow, TimingRow};
 use crate::report::format::{seconds, times};
 use crate::report::order::{RUST, distinct};
@@ -16,7 +17,13 @@ use crate::report::order::{RUST, distinct};
 const MOST_ROWS: usize = 60;
 const ROW: i32 = 24;
 /// Letters of a name before it is cut.
-const NAME: usize = 30;
+const NAME: usize = 24;
+
+const LEGEND: [Entry; 3] = [
+    (Mark::Dot, VERMILION, "rust, median"),
+    (Mark::Square, BLUE, "peer, median"),
+    (Mark::Diamond, PURPLE, "published"),
+];
 
 /// One row of the picture.
 enum Row {
@@ -39,7 +46,7 @@ pub(in crate::report) fn picture(
     let drawn: Vec<&TimingRow> = rows
         .iter()
         .copied()
-        .filter(|r| drawable(r.median_seconds) && r.median_seconds > 0.0)
+        .filter(|r| drawable_positive(r.median_seconds))
         .collect();
     let left_out = rows.len() - drawn.len();
     let mut lines = lines(&drawn, &spreads(samples));
@@ -68,10 +75,7 @@ pub(in crate::report) fn picture(
 /// Least and greatest sample of each case and engine.
 fn spreads<'a>(samples: &[&'a SampleRow]) -> BTreeMap<(&'a str, &'a str), (f64, f64)> {
     let mut spreads = BTreeMap::new();
-    for s in samples
-        .iter()
-        .filter(|s| drawable(s.seconds) && s.seconds > 0.0)
-    {
+    for s in samples.iter().filter(|s| drawable_positive(s.seconds)) {
         let (low, high) = spreads
             .entry((s.case.as_str(), s.engine.as_str()))
             .or_insert((s.seconds, s.seconds));
@@ -94,7 +98,7 @@ fn lines(rows: &[&TimingRow], spreads: &BTreeMap<(&str, &str), (f64, f64)>) -> V
         lines.push(Row::Case(shortened(case, NAME + 20)));
         lines.extend(of_case.iter().map(|r| engine(r, spreads)));
         let paper = of_case.iter().find_map(|r| r.published_seconds);
-        lines.extend(paper.filter(|&p| drawable(p) && p > 0.0).map(Row::Paper));
+        lines.extend(paper.filter(|&p| drawable_positive(p)).map(Row::Paper));
     }
     lines
 }
@@ -131,18 +135,18 @@ fn draw(stage: &str, lines: &[Row]) -> Result<String, PlotError> {
     let label = format!("Times of {stage}, by case and engine, on a logarithmic axis");
     let rows = lines.len() as f64;
     let frame = Frame {
-        size: (600, lines.len() as i32 * ROW + 112),
+        size: (500, lines.len() as i32 * ROW + 112),
         label: &label,
         x: Axis::logarithmic(all(), 6, tick),
         y: Axis::between((0.0, rows), 1),
         x_title: "time of one call",
         y_title: "",
-        sides: (names.max().unwrap_or(0) + 12, 128),
-        legend: &[
-            (Mark::Dot, VERMILION, "rust, median"),
-            (Mark::Square, BLUE, "peer, median"),
-            (Mark::Diamond, PURPLE, "published"),
-        ],
+        sides: (names.max().unwrap_or(0) + 12, 126),
+        legend: if lines.iter().any(|l| matches!(l, Row::Paper(_))) {
+            &LEGEND
+        } else {
+            &LEGEND[..2]
+        },
     };
     chart(&frame, |canvas| {
         lines.iter().enumerate().try_for_each(|(i, line)| {
@@ -189,7 +193,12 @@ impl Row {
         let told =
             |text: &str| canvas.text(text, (right + 10 * FINE, y), HPos::Left, LETTERS - 1, INK);
         match self {
-            Self::Case(case) => canvas.text(case, (left, y), HPos::Left, LETTERS - 1, GREY),
+            Self::Case(case) => {
+                let wide = text_width(case, LETTERS - 1) * FINE;
+                let (from, to) = ((left + FINE, y - 9 * FINE), (left + wide, y + 9 * FINE));
+                canvas.bar(from, to, WHITE)?;
+                canvas.text(case, (left, y), HPos::Left, LETTERS - 1, INK)
+            }
             Self::Paper(time) => {
                 name(PURPLE)?;
                 let at = canvas.at([*time, middle]);
@@ -209,7 +218,7 @@ impl Row {
         }
     }
 
-    /// A pale bar to the median, a whisker over the spread, and the median's mark.
+    /// A pale bar to the median, whiskers over the spread, and the median's mark.
     fn bar(
         &self,
         canvas: &Canvas,
@@ -227,8 +236,8 @@ impl Row {
         let ends = [spread.0, spread.1].map(|s| canvas.at([s, middle]).0);
         canvas.line(vec![(ends[0], y), (ends[1], y)], colour, 1.8)?;
         for end in ends {
-            canvas.line(vec![(end, y - 4 * FINE), (end, y + 4 * FINE)], colour, 1.8)?;
+            canvas.line(vec![(end, y - 6 * FINE), (end, y + 6 * FINE)], colour, 1.8)?;
         }
-        canvas.mark(mark, (x, y), 4.6, colour)
+        canvas.mark(mark, (x, y), 3.4, colour)
     }
 }
