@@ -12,6 +12,7 @@ pub mod roll;
 
 #[cfg(test)]
 mod checks;
+mod cloth;
 mod grid;
 mod implicit;
 mod quadruped;
