@@ -28,7 +28,7 @@ struct Run {
     /// Where the record goes; a new folder under target/meshseq if not given
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Keep the record in results/, as one that is meant to stay
+    /// Keep the record in results/, as one that is meant to stay; without pictures of real data, which may not be passed on
     #[arg(long, conflicts_with = "out")]
     record: bool,
 }
@@ -123,6 +123,10 @@ impl Run {
             bar.inc(1);
         });
         bar.finish_and_clear();
+        if self.record {
+            // Pictures of real data are derived from geometry that may not be passed on; numbers may.
+            record.figures.retain(|figure| figure.dataset.starts_with('@'));
+        }
         record.machine = machine();
         record.command = command();
         record.write(&folder)?;

@@ -24,8 +24,8 @@ pub struct Case {
     pub choice: Choice,
     /// Expected quantities of the Rust answer, as printed: half a unit of the last digit is the tolerance.
     pub expect: BTreeMap<String, Printed>,
-    /// Tolerances that differ from the table's.
-    pub tolerances: BTreeMap<String, Tolerance>,
+    /// Tolerances that differ from the table's, by quantity and engine; the empty engine is any.
+    pub tolerances: BTreeMap<(String, String), Tolerance>,
     pub timeout: Duration,
     /// Whether `measure` times it when no case is named.
     pub measure: bool,
@@ -117,6 +117,9 @@ struct Entry {
 #[serde(deny_unknown_fields)]
 struct Check {
     quantity: String,
+    /// Only for this engine.
+    #[serde(default)]
+    engine: String,
     tolerance: f64,
     reason: String,
 }
@@ -265,7 +268,7 @@ fn printed(text: &str) -> Option<Printed> {
     })
 }
 
-fn tolerances(stage: &str, checks: Vec<Check>) -> Result<BTreeMap<String, Tolerance>, String> {
+fn tolerances(stage: &str, checks: Vec<Check>) -> Result<BTreeMap<(String, String), Tolerance>, String> {
     let mut found = BTreeMap::new();
     for check in checks {
         if !tolerance::is_checked(stage, &check.quantity) {
@@ -290,7 +293,7 @@ fn tolerances(stage: &str, checks: Vec<Check>) -> Result<BTreeMap<String, Tolera
             value: check.tolerance,
             reason: check.reason,
         };
-        found.insert(check.quantity, tolerance);
+        found.insert((check.quantity, check.engine), tolerance);
     }
     Ok(found)
 }
@@ -312,6 +315,15 @@ fn frames(text: Option<&str>, step: usize) -> Result<Frames, String> {
         return Err(wrong());
     }
     Ok(Frames { first, last, step })
+}
+
+impl Case {
+    /// What a quantity is held against: this case's tolerance for the engine, for any engine, or the table's.
+    pub fn tolerance(&self, quantity: &str, engine: &str) -> Option<Tolerance> {
+        let own = |engine: &str| self.tolerances.get(&(quantity.to_owned(), engine.to_owned()));
+        let own = own(engine).or_else(|| own(""));
+        own.cloned().or_else(|| tolerance::find(self.stage, quantity, engine))
+    }
 }
 
 impl std::str::FromStr for Frames {
@@ -410,6 +422,7 @@ mod tests {
     fn a_looser_tolerance_needs_a_reason() {
         let check = |reason: &str| Check {
             quantity: "formula".into(),
+            engine: String::new(),
             tolerance: 1e-3,
             reason: reason.into(),
         };

@@ -6,7 +6,7 @@ use super::case::Case;
 use super::engine::{Engine, Outcome, Question};
 use super::judge::{self, Measured};
 use super::record::{AccuracyRow, AgreementRow, Verdict};
-use super::tolerance::{self, Tolerance};
+use super::tolerance::Tolerance;
 use crate::arrays::Bundle;
 use crate::stages::{self, Stage};
 
@@ -162,11 +162,7 @@ fn settle(
         .map(|&(quantity, value)| Held {
             quantity: quantity.into(),
             value,
-            tolerance: case
-                .tolerances
-                .get(quantity)
-                .cloned()
-                .or_else(|| tolerance::find(case.stage, quantity, engine)),
+            tolerance: case.tolerance(quantity, engine),
         })
         .collect();
     if engine == "rust" {
