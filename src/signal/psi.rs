@@ -10,7 +10,7 @@ use super::rho::Rho;
 use crate::linalg::kernels::combine;
 
 /// Numbers of a frame worked on at a time, so that they stay in cache while H is read once.
-const BLOCK: usize = 1024;
+const BLOCK: usize = 512;
 
 /// The time signal f = f~ o rho (section 2.3).
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +35,12 @@ impl TimeSignal {
     /// f(t) for a frame time t in [1, n]; beyond the ends the end poses hold.
     pub fn evaluate(&self, t: f64) -> Point {
         self.spline.evaluate(self.rho.evaluate(t))
+    }
+
+    /// f at many frame times.
+    pub fn evaluate_all(&self, times: &[f64]) -> Vec<Point> {
+        let parameters: Vec<f64> = times.iter().map(|&t| self.rho.evaluate(t)).collect();
+        self.spline.evaluate_all(&parameters)
     }
 
     /// n, the number of frames represented.
@@ -64,15 +70,15 @@ impl Representation {
 
     /// h(x) into `frame` (d numbers), reading H once. O(d m).
     pub fn shape_into(&self, x: &[f64], frame: &mut [f64]) {
-        frame
-            .par_chunks_mut(BLOCK)
-            .with_min_len(4)
-            .enumerate()
-            .for_each(|(b, block)| {
-                let rows = b * BLOCK..b * BLOCK + block.len();
-                block.copy_from_slice(&self.offset[rows.clone()]);
-                combine(x, |j| &self.basis.col_as_slice(j)[rows.clone()], block);
-            });
+        let blocks = frame.par_chunks_mut(BLOCK).with_min_len(4);
+        blocks.enumerate().for_each(|(b, rows)| self.shape_block(x, b, rows));
+    }
+
+    /// Block `b` of h(x).
+    fn shape_block(&self, x: &[f64], b: usize, rows: &mut [f64]) {
+        let place = b * BLOCK..b * BLOCK + rows.len();
+        rows.copy_from_slice(&self.offset[place.clone()]);
+        combine(x, |j| &self.basis.col_as_slice(j)[place.clone()], rows);
     }
 
     /// psi(t) into `frame` (d numbers), for a frame time t in [1, n]. O(l m + d m).
@@ -82,15 +88,24 @@ impl Representation {
         self.shape_into(&x, frame);
     }
 
-    /// psi at many times, d numbers a time, in parallel over the times.
+    /// psi at many times, d numbers a time. The bits of a frame are those of [`Self::evaluate_into`], whatever the other times.
+    ///
+    /// A block of rows of H stays in cache for all times, so that memory gives H once.
     pub fn evaluate(&self, times: &[f64]) -> Vec<f64> {
-        let mut frames = vec![0.0; self.dimension() * times.len()];
-        if self.dimension() > 0 {
-            frames
-                .par_chunks_mut(self.dimension())
-                .zip(times)
-                .for_each(|(frame, &t)| self.evaluate_into(t, frame));
+        let d = self.dimension();
+        let coordinates = self.pose.evaluate(&self.time.evaluate_all(times));
+        let mut frames = vec![0.0; d * times.len()];
+        let mut blocks: Vec<Vec<&mut [f64]>> = (0..d.div_ceil(BLOCK)).map(|_| Vec::new()).collect();
+        for frame in frames.chunks_mut(d.max(1)) {
+            for (block, rows) in blocks.iter_mut().zip(frame.chunks_mut(BLOCK)) {
+                block.push(rows);
+            }
         }
+        blocks.into_par_iter().enumerate().for_each(|(b, block)| {
+            for (i, rows) in block.into_iter().enumerate() {
+                self.shape_block(coordinates.col_as_slice(i), b, rows);
+            }
+        });
         frames
     }
 
