@@ -27,9 +27,7 @@ fn example(verb: &[&str]) -> Option<String> {
     let mut arguments = verb.to_vec();
     arguments.push("--help");
     let help = meshseq(&arguments);
-    help.lines()
-        .find_map(|line| line.strip_prefix("Example: meshseq "))
-        .map(str::to_owned)
+    help.split_once("Example: meshseq ").map(|(_, rest)| rest.to_owned())
 }
 
 #[test]
