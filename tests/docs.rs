@@ -8,7 +8,11 @@ fn meshseq(arguments: &[&str]) -> String {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -27,13 +31,20 @@ fn example(verb: &[&str]) -> Option<String> {
     let mut arguments = verb.to_vec();
     arguments.push("--help");
     let help = meshseq(&arguments);
-    help.split_once("Example: meshseq ").map(|(_, rest)| rest.to_owned())
+    help.split_once("Example: meshseq ")
+        .map(|(_, rest)| rest.to_owned())
 }
 
 #[test]
 fn examples_on_embedded_sequences_run_as_written() {
     let folder = tempfile::tempdir().unwrap();
-    for verb in [vec!["info"], vec!["convert"], vec!["list"], vec!["signal", "fit"], vec!["signal", "sample"]] {
+    for verb in [
+        vec!["info"],
+        vec!["convert"],
+        vec!["list"],
+        vec!["signal", "fit"],
+        vec!["signal", "sample"],
+    ] {
         let example = example(&verb).unwrap_or_else(|| panic!("{verb:?} has no example"));
         // `sample` reads what the example of `fit` wrote.
         let output = Command::new(env!("CARGO_BIN_EXE_meshseq"))
@@ -42,6 +53,10 @@ fn examples_on_embedded_sequences_run_as_written() {
             .env("MESHSEQ_HOME", env!("CARGO_MANIFEST_DIR"))
             .output()
             .unwrap();
-        assert!(output.status.success(), "{example}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{example}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
     }
 }

@@ -38,7 +38,10 @@ fn horse() {
 
 #[test]
 fn repeated_poses_of_the_horse() {
-    verify("horse-gallop", &["signal/*/horse-twice", "signal/*/horse-odd"]);
+    verify(
+        "horse-gallop",
+        &["signal/*/horse-twice", "signal/*/horse-odd"],
+    );
 }
 
 #[test]

@@ -67,7 +67,11 @@ impl Verify {
             None => None,
         };
         let cases = select(read_all(&home().join("bench/cases"))?, &self.run.cases)?;
-        let timing = if self.time { Timing::Marked } else { Timing::None };
+        let timing = if self.time {
+            Timing::Marked
+        } else {
+            Timing::None
+        };
         let record = self.run.execute(&cases, fault, timing)?;
         let wrong = record.agreement.iter().filter(|row| {
             !matches!(
@@ -125,7 +129,9 @@ impl Run {
         bar.finish_and_clear();
         if self.record {
             // Pictures of real data are derived from geometry that may not be passed on; numbers may.
-            record.figures.retain(|figure| figure.dataset.starts_with('@'));
+            record
+                .figures
+                .retain(|figure| figure.dataset.starts_with('@'));
         }
         record.machine = machine();
         record.command = command();

@@ -268,7 +268,10 @@ fn printed(text: &str) -> Option<Printed> {
     })
 }
 
-fn tolerances(stage: &str, checks: Vec<Check>) -> Result<BTreeMap<(String, String), Tolerance>, String> {
+fn tolerances(
+    stage: &str,
+    checks: Vec<Check>,
+) -> Result<BTreeMap<(String, String), Tolerance>, String> {
     let mut found = BTreeMap::new();
     for check in checks {
         if !tolerance::is_checked(stage, &check.quantity) {
@@ -320,9 +323,13 @@ fn frames(text: Option<&str>, step: usize) -> Result<Frames, String> {
 impl Case {
     /// What a quantity is held against: this case's tolerance for the engine, for any engine, or the table's.
     pub fn tolerance(&self, quantity: &str, engine: &str) -> Option<Tolerance> {
-        let own = |engine: &str| self.tolerances.get(&(quantity.to_owned(), engine.to_owned()));
+        let own = |engine: &str| {
+            self.tolerances
+                .get(&(quantity.to_owned(), engine.to_owned()))
+        };
         let own = own(engine).or_else(|| own(""));
-        own.cloned().or_else(|| tolerance::find(self.stage, quantity, engine))
+        own.cloned()
+            .or_else(|| tolerance::find(self.stage, quantity, engine))
     }
 }
 

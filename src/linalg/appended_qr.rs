@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatRef};
 
-use super::kernels::{axpy, combine, dot, norm_squared};
+use super::kernels::{add_squares, axpy, combine, dot, norm_squared};
 
 /// A column whose part outside the span of the columns before it is smaller than this share of it adds nothing but rounding.
 const INDEPENDENT: f64 = 1e-12;
@@ -13,15 +13,22 @@ const REPROJECT: f64 = 0.1;
 pub struct AppendedQr {
     basis: Vec<Vec<f64>>,
     residual: Mat<f64>,
+    row_squares: Vec<f64>,
     projections: Vec<f64>,
 }
 
 impl AppendedQr {
     /// Starts with no columns: the residual is the right-hand sides, n x m.
     pub fn new(right_hand_sides: MatRef<'_, f64>) -> Self {
+        let residual = right_hand_sides.to_owned();
+        let mut row_squares = vec![0.0; residual.nrows()];
+        for j in 0..residual.ncols() {
+            add_squares(residual.col_as_slice(j), &mut row_squares);
+        }
         Self {
             basis: Vec::new(),
-            residual: right_hand_sides.to_owned(),
+            residual,
+            row_squares,
             projections: Vec::new(),
         }
     }
@@ -38,10 +45,12 @@ impl AppendedQr {
             return false;
         }
         column.iter_mut().for_each(|x| *x /= left);
+        self.row_squares.fill(0.0);
         for j in 0..self.residual.ncols() {
             let residual = self.residual.col_as_slice_mut(j);
             let share = dot(&column, residual);
             axpy(-share, &column, residual);
+            add_squares(residual, &mut self.row_squares);
         }
         self.basis.push(column);
         true
@@ -54,6 +63,11 @@ impl AppendedQr {
             .extend(self.basis.iter().map(|q| -dot(q, column)));
         combine(&self.projections, |j| &self.basis[j], column);
         norm_squared(column).sqrt()
+    }
+
+    /// The square of the norm of each row of the residual.
+    pub fn row_squares(&self) -> &[f64] {
+        &self.row_squares
     }
 
     /// n x m: the right-hand sides less their projections on the columns.
@@ -79,7 +93,10 @@ mod tests {
         let qr = Qr::new(a.clone());
         qr.apply_transpose(&mut qtb);
         let residual = &b - &a * qr.solve_upper(&qtb);
-        assert!((grown.residual() - residual).norm_max() < 1e-13);
+        assert!((grown.residual() - &residual).norm_max() < 1e-13);
+        for i in 0..20 {
+            assert!((grown.row_squares()[i] - residual.row(i).squared_norm_l2()).abs() < 1e-13);
+        }
     }
 
     #[test]

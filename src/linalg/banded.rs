@@ -57,8 +57,14 @@ impl BandedLeastSquares {
     /// An estimate, from above and close, of the least singular value over the largest pivot: inverse iteration with R^T R, O(columns).
     pub fn reciprocal_condition(&self) -> f64 {
         let columns = self.upper.len();
-        let largest = self.upper.iter().map(|row| row[0].abs()).fold(0.0, f64::max);
-        let mut x: Vec<f64> = (0..columns).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let largest = self
+            .upper
+            .iter()
+            .map(|row| row[0].abs())
+            .fold(0.0, f64::max);
+        let mut x: Vec<f64> = (0..columns)
+            .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
         let mut growth = 0.0;
         for _ in 0..INVERSE_STEPS {
             let norm = x.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -116,7 +122,11 @@ mod tests {
         // The bidiagonal matrix with 1 on the diagonal and -2 beside it: pivots are 1, the least singular value about 2^-39.
         let mut system = BandedLeastSquares::new(40);
         for i in 0..40 {
-            let row = if i < 37 { [1.0, -2.0, 0.0, 0.0] } else { [0.0; BAND] };
+            let row = if i < 37 {
+                [1.0, -2.0, 0.0, 0.0]
+            } else {
+                [0.0; BAND]
+            };
             if i < 37 {
                 system.add(i, row, [0.0; 2]);
             }

@@ -1,8 +1,9 @@
 //! Dense factorisations of faer, on one thread, with errors in place of panics.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::matmul::matmul;
 use faer::linalg::{evd, householder, qr, svd, triangular_solve};
-use faer::{Conj, Mat, MatRef, Par, diag::Diag};
+use faer::{Accum, Conj, Mat, MatRef, Par, diag::Diag};
 use thiserror::Error;
 
 /// Why a dense factorisation failed.
@@ -17,6 +18,13 @@ pub enum FactorError {
         rows: usize,
         columns: usize,
     },
+}
+
+/// A B.
+pub fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut product = Mat::zeros(a.nrows(), b.ncols());
+    matmul(product.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
+    product
 }
 
 /// Eigenvalues by decreasing size and their unit eigenvectors as columns.

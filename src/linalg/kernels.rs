@@ -64,6 +64,15 @@ vectorised! {
 }
 
 vectorised! {
+    /// y_i += x_i^2.
+    pub fn add_squares(x: &[f64], y: &mut [f64]) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y += x * x;
+        }
+    }
+}
+
+vectorised! {
     /// y += a_0 x_0 + a_1 x_1 + a_2 x_2 + a_3 x_3, reading and writing y once.
     pub fn axpy4(a: [f64; 4], x: [&[f64]; 4], y: &mut [f64]) {
         let n = y.len();

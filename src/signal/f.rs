@@ -14,7 +14,10 @@ const DEFICIENT: f64 = 1e-11;
 const FAR: f64 = 10.0;
 
 fn reach(points: &[Point]) -> f64 {
-    points.as_flattened().iter().fold(0.0, |reach, x| x.abs().max(reach))
+    points
+        .as_flattened()
+        .iter()
+        .fold(0.0, |reach, x| x.abs().max(reach))
 }
 
 /// f~(u) = sum_j B_j(u) f_j with cubic B-splines.

@@ -71,7 +71,9 @@ impl Representation {
     /// h(x) into `frame` (d numbers), reading H once. O(d m).
     pub fn shape_into(&self, x: &[f64], frame: &mut [f64]) {
         let blocks = frame.par_chunks_mut(BLOCK).with_min_len(4);
-        blocks.enumerate().for_each(|(b, rows)| self.shape_block(x, b, rows));
+        blocks
+            .enumerate()
+            .for_each(|(b, rows)| self.shape_block(x, b, rows));
     }
 
     /// Block `b` of h(x).

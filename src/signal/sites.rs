@@ -5,8 +5,8 @@ use faer::{Mat, MatRef};
 use super::Point;
 use super::thin_plate::{Frame, between};
 use crate::linalg::appended_qr::AppendedQr;
-use crate::linalg::dense::{FactorError, symmetric_eigen};
-use crate::linalg::kernels::norm_squared;
+use crate::linalg::dense::{FactorError, product, symmetric_eigen};
+use crate::linalg::kernels::{axpy, norm_squared};
 
 /// Errors smaller than this share of the data's norm count as 0 (reading 5).
 const NEGLIGIBLE: f64 = 1e-12;
@@ -39,7 +39,7 @@ pub fn site_order(
     candidates: &[bool],
 ) -> Result<SiteOrder, FactorError> {
     let mut search = Search::new(points, coordinates, candidates);
-    let distances = plane_distances(coordinates)?;
+    let distances = squared_plane_distances(coordinates)?;
     for _ in 0..count.min(4) {
         let Some(next) = search.farthest(&distances) else {
             break;
@@ -48,8 +48,7 @@ pub fn site_order(
     }
     search.begin();
     while search.order.len() < count {
-        let residual = column_norms(search.fit.residual());
-        let Some(next) = search.farthest(&residual) else {
+        let Some(next) = search.farthest(search.fit.row_squares()) else {
             break;
         };
         search.choose(next);
@@ -68,15 +67,17 @@ struct Search<'a> {
     /// Frames that may still become sites, the candidates before the others.
     open: Vec<bool>,
     candidates: &'a [bool],
-    /// Up to three sites that span the plane, by which the others meet the side conditions.
+    /// Up to three sites that span the plane, by which the others meet the side conditions, and their kernels at every frame.
     reference: Vec<usize>,
+    reference_kernels: Vec<Vec<f64>>,
     fit: AppendedQr,
     residual_squares: Vec<f64>,
-    coordinates: MatRef<'a, f64>,
+    /// ||X||^2.
+    data: f64,
 }
 
 impl<'a> Search<'a> {
-    fn new(points: &[Point], coordinates: MatRef<'a, f64>, candidates: &'a [bool]) -> Self {
+    fn new(points: &[Point], coordinates: MatRef<'_, f64>, candidates: &'a [bool]) -> Self {
         let frame = Frame::new(points);
         Self {
             points: points.iter().map(|&p| frame.normalise(p)).collect(),
@@ -84,24 +85,25 @@ impl<'a> Search<'a> {
             open: vec![true; points.len()],
             candidates,
             reference: Vec::new(),
+            reference_kernels: Vec::new(),
             fit: AppendedQr::new(coordinates.transpose()),
             residual_squares: Vec::new(),
-            coordinates,
+            data: coordinates.squared_norm_l2(),
         }
     }
 
-    /// The open frame with the greatest value, a candidate if there is one; the lowest index of equals, and what is negligible is equal to 0.
-    fn farthest(&self, values: &[f64]) -> Option<usize> {
-        let negligible = NEGLIGIBLE * self.coordinates.norm_l2();
+    /// The open frame with the greatest squared error, a candidate if there is one; the lowest index of equals, and what is negligible is equal to 0.
+    fn farthest(&self, squares: &[f64]) -> Option<usize> {
+        let negligible = NEGLIGIBLE * NEGLIGIBLE * self.data;
         let value = |i: usize| {
-            if values[i] <= negligible {
+            if squares[i] <= negligible {
                 0.0
             } else {
-                values[i]
+                squares[i]
             }
         };
         let worst = |candidate: bool| {
-            (0..values.len())
+            (0..squares.len())
                 .filter(|&i| self.open[i] && self.candidates[i] == candidate)
                 .reduce(|best, i| if value(i) > value(best) { i } else { best })
         };
@@ -119,7 +121,9 @@ impl<'a> Search<'a> {
 
     /// The fit of the first sites: the affine functions, then the kernels of what is not a corner of the reference triangle.
     fn begin(&mut self) {
-        self.reference = reference_sites(&self.points, &self.order);
+        for site in reference_sites(&self.points, &self.order) {
+            self.refer(site);
+        }
         self.append(self.points.iter().map(|_| 1.0).collect());
         for axis in 0..self.reference.len().saturating_sub(1) {
             self.append(self.points.iter().map(|p| p[axis]).collect());
@@ -141,7 +145,7 @@ impl<'a> Search<'a> {
         let completes = self.reference.len() < 3 && !self.spanned(site);
         if completes {
             let axis = self.reference.len() - 1;
-            self.reference.push(site);
+            self.refer(site);
             self.append(self.points.iter().map(|p| p[axis]).collect());
         } else {
             self.append(self.kernel_column(site));
@@ -155,17 +159,25 @@ impl<'a> Search<'a> {
         spread(&self.points, &corners) <= FLAT
     }
 
+    fn refer(&mut self, site: usize) {
+        self.reference.push(site);
+        self.reference_kernels.push(self.kernels(site));
+    }
+
+    /// phi(s - p) at every frame.
+    fn kernels(&self, site: usize) -> Vec<f64> {
+        let s = self.points[site];
+        self.points.iter().map(|&p| between(s, p)).collect()
+    }
+
     /// phi(s - p) less the barycentric mixture of the reference kernels, at every frame.
     fn kernel_column(&self, site: usize) -> Vec<f64> {
         let weights = barycentric(&self.points, &self.reference, self.points[site]);
-        let value = |&p: &Point| {
-            let mixture = self.reference.iter().zip(&weights);
-            between(self.points[site], p)
-                - mixture
-                    .map(|(&r, w)| w * between(self.points[r], p))
-                    .sum::<f64>()
-        };
-        self.points.iter().map(value).collect()
+        let mut column = self.kernels(site);
+        for (kernels, weight) in self.reference_kernels.iter().zip(weights) {
+            axpy(-weight, kernels, &mut column);
+        }
+        column
     }
 
     fn append(&mut self, column: Vec<f64>) {
@@ -173,48 +185,33 @@ impl<'a> Search<'a> {
     }
 
     fn record(&mut self) {
-        let residual = self.fit.residual();
-        let square: f64 = (0..residual.ncols())
-            .map(|j| residual.col(j).iter().map(|x| x * x).sum::<f64>())
-            .sum();
-        self.residual_squares.push(square);
+        self.residual_squares
+            .push(self.fit.row_squares().iter().sum());
     }
 
     /// Error (4) from three sites on; where the reference is not a triangle the spaces begin smaller and the entries before are dropped.
     fn errors(&self) -> Vec<f64> {
-        let total: f64 = self.coordinates.squared_norm_l2();
         let wanted = self.order.len().saturating_sub(2).max(1);
         let surplus = self.residual_squares.len().saturating_sub(wanted);
         self.residual_squares[surplus..]
             .iter()
-            .map(|&e| if e <= NEGLIGIBLE * total { 0.0 } else { e })
+            .map(|&e| if e <= NEGLIGIBLE * self.data { 0.0 } else { e })
             .collect()
     }
 }
 
-/// Distances of the columns of X to the best-fit plane, which passes through their centroid (reading 5). O(n m^2).
-fn plane_distances(coordinates: MatRef<'_, f64>) -> Result<Vec<f64>, FactorError> {
+/// Squared distances of the columns of X to the best-fit plane, which passes through their centroid (reading 5). O(n m^2).
+fn squared_plane_distances(coordinates: MatRef<'_, f64>) -> Result<Vec<f64>, FactorError> {
     let (m, n) = coordinates.shape();
     let mean: Vec<f64> = (0..m)
         .map(|a| (0..n).map(|i| coordinates[(a, i)]).sum::<f64>() / n as f64)
         .collect();
     let centred = Mat::from_fn(m, n, |a, i| coordinates[(a, i)] - mean[a]);
-    let axes = symmetric_eigen((&centred * centred.transpose()).as_ref())?.vectors;
-    let across = axes.get(.., 2.min(m)..).transpose() * &centred;
+    let axes = symmetric_eigen(product(centred.as_ref(), centred.transpose()).as_ref())?.vectors;
+    let across = product(axes.get(.., 2.min(m)..).transpose(), centred.as_ref());
     Ok((0..n)
-        .map(|i| norm_squared(across.col_as_slice(i)).sqrt())
+        .map(|i| norm_squared(across.col_as_slice(i)))
         .collect())
-}
-
-/// Norm of each frame's residual; `residual` is n x m.
-fn column_norms(residual: MatRef<'_, f64>) -> Vec<f64> {
-    let mut squares = vec![0.0; residual.nrows()];
-    for j in 0..residual.ncols() {
-        for (sum, x) in squares.iter_mut().zip(residual.col(j).iter()) {
-            *sum += x * x;
-        }
-    }
-    squares.into_iter().map(f64::sqrt).collect()
 }
 
 /// Twice the area of three points, the distance of two, 1 for one.
