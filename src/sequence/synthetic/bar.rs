@@ -124,9 +124,9 @@ fn box_surface(cells: [usize; 3]) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
         points: Vec::new(),
         faces: Vec::new(),
     };
-    for axis in 0..3 {
+    for (axis, last) in cells.into_iter().enumerate() {
         surface.add_side(axis, 0);
-        surface.add_side(axis, cells[axis]);
+        surface.add_side(axis, last);
     }
     (surface.points, surface.faces)
 }

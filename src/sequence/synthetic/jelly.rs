@@ -7,7 +7,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::implicit::{Cone, Solid};
-use super::soft_body::{Material, Ride, SoftBody};
+use super::ride::Ride;
+use super::soft_body::{Material, SoftBody};
 use super::{SyntheticError, assemble, smoothstep, surface_nets};
 use crate::sequence::Sequence;
 

@@ -1,9 +1,9 @@
-//! An articulated quadruped: its bones, the solid around them, and the skin that follows them.
+//! An articulated quadruped: its bones and the solid around them.
 //!
 //! x is forward, y up, z to its right; the ground is y = 0. Limbs bend in planes of constant z: a positive angle about z swings a hanging
 //! limb forward and lifts a nose.
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::implicit::{Cone, Solid};
 use super::surface_nets::{self, Surface};
@@ -21,8 +21,15 @@ pub(super) struct Animal {
     pub solid: Solid,
     /// The bone of each cone of `solid`.
     pub owner: Vec<usize>,
-    /// Names and places near the skin at rest.
-    pub landmarks: Vec<(&'static str, Vector3<f64>)>,
+    pub landmarks: Vec<Landmark>,
+}
+
+/// A named place of the skin at rest: where the ray from a point inside leaves the solid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Landmark {
+    pub name: &'static str,
+    inside: Vector3<f64>,
+    towards: Vector3<f64>,
 }
 
 pub(super) const TORSO: usize = 0;
@@ -111,13 +118,12 @@ impl Animal {
             [0.24, 0.17],
             [0.85, 0.15],
         );
-        self.landmarks.extend([
-            ("croup", sagittal(-0.55, 1.5)),
-            ("loin", sagittal(-0.02, 1.45)),
-            ("withers", sagittal(0.4, 1.52)),
-            ("belly", sagittal(-0.02, 0.9)),
-            ("breast", sagittal(0.83, 1.16)),
-        ]);
+        let (up, down) = (Vector3::y(), -Vector3::y());
+        self.landmark("croup", sagittal(-0.55, 1.2), up);
+        self.landmark("loin", sagittal(-0.02, 1.2), up);
+        self.landmark("withers", sagittal(0.4, 1.2), up);
+        self.landmark("belly", sagittal(-0.02, 1.2), down);
+        self.landmark("breast", sagittal(0.5, 1.16), Vector3::x());
     }
 
     fn add_head(&mut self, stout: f64) {
@@ -153,13 +159,11 @@ impl Animal {
                 Vector3::new(1.02, 1.93, 0.055 * side),
                 Vector3::new(1.03, 2.08, 0.10 * side),
             ];
-            self.cone(head, ear, [0.05, 0.03].map(|r| r * stout), [1.0, 0.04]);
+            self.cone(head, ear, [0.055, 0.042].map(|r| r * stout), [1.0, 0.04]);
         }
-        self.landmarks.extend([
-            ("poll", sagittal(0.99, 2.0)),
-            ("nose", sagittal(1.5, 1.5)),
-            ("throat", sagittal(1.02, 1.68)),
-        ]);
+        self.landmark("poll", sagittal(1.05, 1.84), sagittal(-0.3, 1.0));
+        self.landmark("nose", nose, nose - poll);
+        self.landmark("throat", sagittal(1.0, 1.8), sagittal(0.4, -1.0));
     }
 
     fn add_tail(&mut self, stout: f64) {
@@ -169,7 +173,7 @@ impl Animal {
             sagittal(-1.09, 0.96),
             sagittal(-1.14, 0.62),
         ];
-        let radii = [0.055, 0.07, 0.08, 0.045].map(|r| r * stout);
+        let radii = [0.055, 0.07, 0.08, 0.062].map(|r| r * stout);
         let mut parent = TORSO;
         for i in 0..3 {
             parent = self.bone(Some(parent), joints[i]);
@@ -180,10 +184,8 @@ impl Animal {
                 [0.9, 0.06],
             );
         }
-        self.landmarks.extend([
-            ("dock", joints[0] + sagittal(0.0, 0.1)),
-            ("tail_tip", joints[3] - sagittal(0.0, 0.1)),
-        ]);
+        self.landmark("dock", joints[0], Vector3::y());
+        self.landmark("tail_tip", joints[3], joints[3] - joints[2]);
     }
 
     fn add_leg(
@@ -210,9 +212,18 @@ impl Animal {
                 [0.85, leg.blends[i]],
             );
         }
-        let outward = Vector3::z() * (0.3 * side);
-        let places = joints.iter().map(|joint| joint + outward);
-        self.landmarks.extend(names.into_iter().zip(places));
+        for (name, joint) in names.into_iter().zip(&joints[..4]) {
+            self.landmark(name, *joint, Vector3::z() * side);
+        }
+        self.landmark(names[4], joints[4], joints[4] - joints[3]);
+    }
+
+    fn landmark(&mut self, name: &'static str, inside: Vector3<f64>, towards: Vector3<f64>) {
+        self.landmarks.push(Landmark {
+            name,
+            inside,
+            towards: towards.normalize(),
+        });
     }
 
     /// The skin at rest.
@@ -220,18 +231,34 @@ impl Animal {
         surface_nets::polygonise(&self.solid, spacing)
     }
 
+    /// The bone of the cone that is nearest to a point of the skin.
+    pub fn nearest_bone(&self, point: &Vector3<f64>) -> usize {
+        let values = self.solid.cones.iter().map(|cone| cone.value(point));
+        let nearest = values.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        self.owner[nearest.map_or(0, |(cone, _)| cone)]
+    }
+
     /// The index of the vertex nearest to each landmark; ties go to the lower index.
     pub fn marked(&self, points: &[Vector3<f64>]) -> Vec<(&'static str, u32)> {
-        let nearest = |place: &Vector3<f64>| {
+        let nearest = |place: Vector3<f64>| {
             let distance = |v: &usize| (points[*v] - place).norm_squared();
-            (0..points.len())
-                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .unwrap_or(0)
+            let nearer = |a: &usize, b: &usize| distance(a).total_cmp(&distance(b));
+            (0..points.len()).min_by(nearer).unwrap_or(0)
         };
-        self.landmarks
+        let places = self
+            .landmarks
             .iter()
-            .map(|(name, place)| (*name, nearest(place) as u32))
+            .map(|mark| (mark.name, self.surfacing(mark)));
+        places
+            .map(|(name, place)| (name, nearest(place) as u32))
             .collect()
+    }
+
+    /// Where the ray of a landmark leaves the solid, to half a centimetre.
+    fn surfacing(&self, mark: &Landmark) -> Vector3<f64> {
+        let along = (0..200).map(|i| mark.inside + mark.towards * (0.005 * f64::from(i)));
+        let mut outside = along.skip_while(|place| self.solid.value(place) < 0.0);
+        outside.next().unwrap_or(mark.inside)
     }
 
     /// Where each bone is, given its rotation relative to its parent and the motion of the root.
@@ -264,7 +291,7 @@ const HIND: Leg = Leg {
         [-0.66, 0.16, 0.15],
         [-0.58, 0.05, 0.15],
     ],
-    radii: [0.20, 0.115, 0.062, 0.05, 0.065],
+    radii: [0.20, 0.115, 0.065, 0.055, 0.07],
     blends: [0.12, 0.08, 0.05, 0.04],
 };
 const FORE: Leg = Leg {
@@ -275,7 +302,7 @@ const FORE: Leg = Leg {
         [0.45, 0.16, 0.15],
         [0.52, 0.05, 0.15],
     ],
-    radii: [0.16, 0.105, 0.065, 0.05, 0.065],
+    radii: [0.16, 0.105, 0.065, 0.055, 0.07],
     blends: [0.12, 0.08, 0.05, 0.04],
 };
 const HIND_NAMES: [[&str; 5]; 2] = [
@@ -310,87 +337,3 @@ const FORE_NAMES: [[&str; 5]; 2] = [
         "right_fore_hoof",
     ],
 ];
-
-/// How much each vertex follows each bone, V x bones row-major; each row sums to 1.
-pub(super) struct Weights {
-    bones: usize,
-    values: Vec<f64>,
-}
-
-impl Weights {
-    /// Starts from the nearest cone's bone and lets the weights diffuse along the surface over about `reach`.
-    ///
-    /// As they travel along the surface and not through space, one leg never drags the other along.
-    pub fn new(animal: &Animal, skin: &Surface, spacing: f64, reach: f64) -> Self {
-        let bones = animal.bones.len();
-        let mut values = vec![0.0; skin.points.len() * bones];
-        for (row, point) in values.chunks_exact_mut(bones).zip(&skin.points) {
-            row[nearest_bone(animal, point)] = 1.0;
-        }
-        let mut weights = Self { bones, values };
-        for _ in 0..(reach / spacing).powi(2).ceil() as usize {
-            weights.diffuse(&skin.faces);
-        }
-        weights
-    }
-
-    /// One step: half of each row stays, half is the mean over the neighbours.
-    fn diffuse(&mut self, faces: &[[u32; 3]]) {
-        let bones = self.bones;
-        let mut sums = vec![0.0; self.values.len()];
-        let mut counts = vec![0.0; self.values.len() / bones];
-        for face in faces {
-            for i in 0..3 {
-                let (to, from) = (face[i] as usize, face[(i + 1) % 3] as usize);
-                counts[to] += 1.0;
-                for bone in 0..bones {
-                    sums[to * bones + bone] += self.values[from * bones + bone];
-                }
-            }
-        }
-        for (i, value) in self.values.iter_mut().enumerate() {
-            *value = 0.5 * (*value + sums[i] / counts[i / bones]);
-        }
-    }
-
-    /// The skin moved by its bones: blended unit dual quaternions (Kavan et al. 2007), which keep limbs round at their joints.
-    pub fn skin(&self, rest: &[Vector3<f64>], placed: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
-        let motions: Vec<_> = placed.iter().map(dual_quaternion).collect();
-        let rows = self.values.chunks_exact(self.bones);
-        rows.zip(rest)
-            .map(|(row, point)| blend(row, &motions, point))
-            .collect()
-    }
-}
-
-fn nearest_bone(animal: &Animal, point: &Vector3<f64>) -> usize {
-    let values = animal.solid.cones.iter().map(|cone| cone.value(point));
-    let nearest = values.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-    animal.owner[nearest.map_or(0, |(cone, _)| cone)]
-}
-
-type DualQuaternion = (Quaternion<f64>, Quaternion<f64>);
-
-fn dual_quaternion(motion: &Isometry3<f64>) -> DualQuaternion {
-    let rotation = motion.rotation.into_inner();
-    let dual = Quaternion::from_imag(motion.translation.vector) * rotation * 0.5;
-    (rotation, dual)
-}
-
-fn blend(weights: &[f64], motions: &[DualQuaternion], point: &Vector3<f64>) -> Vector3<f64> {
-    let zero = Quaternion::from_imag(Vector3::zeros());
-    let (mut real, mut dual) = (zero, zero);
-    for (&weight, motion) in weights.iter().zip(motions) {
-        let signed = if real.dot(&motion.0) < 0.0 {
-            -weight
-        } else {
-            weight
-        };
-        real += motion.0 * signed;
-        dual += motion.1 * signed;
-    }
-    let rotation = UnitQuaternion::new_normalize(real);
-    let scale = 1.0 / real.norm();
-    let shift = (dual * scale * rotation.into_inner().conjugate()).imag() * 2.0;
-    rotation * point + shift
-}

@@ -1,9 +1,9 @@
-//! An elastic body of tetrahedra on a lattice, and a surface that rides on it.
+//! An elastic body of tetrahedra on a lattice.
 //!
 //! Stable neo-Hookean elasticity by small-step extended position-based dynamics: two constraints a tetrahedron, one for its shape and one
 //! for its volume (Macklin & Müller 2021, "A constraint-based formulation of stable neo-Hookean materials").
 
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix3, Vector3};
 
 use super::implicit::Solid;
 
@@ -109,8 +109,7 @@ impl SoftBody {
             self.inverse_masses[node] = 0.0;
         }
         for tetrahedron in &self.tetrahedra {
-            tetrahedron.restore_shape(&mut self.points, &self.inverse_masses, self.material, step);
-            tetrahedron.restore_volume(&mut self.points, &self.inverse_masses, self.material, step);
+            tetrahedron.restore(&mut self.points, &self.inverse_masses, &self.material, step);
         }
         self.rest_on_floor(&before);
         for (v, velocity) in self.velocities.iter_mut().enumerate() {
@@ -138,58 +137,39 @@ fn edges(points: &[Vector3<f64>], [a, b, c, d]: [usize; 4]) -> Matrix3<f64> {
 }
 
 impl Tetrahedron {
-    fn restore_shape(
-        &self,
-        points: &mut [Vector3<f64>],
-        masses: &[f64],
-        material: Material,
-        step: f64,
-    ) {
-        let f = edges(points, self.nodes) * self.inverse_rest;
-        let size = f.norm();
-        if size > 1e-9 {
-            let compliance = 1.0 / (material.shear * self.volume * step * step);
-            self.correct(points, masses, size, f / size, compliance);
-        }
-    }
-
-    fn restore_volume(
-        &self,
-        points: &mut [Vector3<f64>],
-        masses: &[f64],
-        material: Material,
-        step: f64,
-    ) {
+    /// One iteration of XPBD on the size of the deformation gradient and on its determinant, both at once: at rest, where the one pulls
+    /// as the other pushes, nothing moves.
+    fn restore(&self, points: &mut [Vector3<f64>], masses: &[f64], material: &Material, step: f64) {
         let f = edges(points, self.nodes) * self.inverse_rest;
         let (x, y, z) = (f.column(0), f.column(1), f.column(2));
+        let size = f.norm().max(1e-9);
         let cofactors = Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)]);
+        let shape = self.slopes(f / size);
+        let volume = self.slopes(cofactors);
         let excess = f.determinant() - 1.0 - material.shear / material.bulk;
-        let compliance = 1.0 / (material.bulk * self.volume * step * step);
-        self.correct(points, masses, excess, cofactors, compliance);
+
+        let stiffness = self.volume * step * step;
+        let masses = self.nodes.map(|node| masses[node]);
+        let product = |a: &[Vector3<f64>; 4], b: &[Vector3<f64>; 4]| -> f64 {
+            (0..4).map(|i| masses[i] * a[i].dot(&b[i])).sum()
+        };
+        let a = product(&shape, &shape) + 1.0 / (material.shear * stiffness);
+        let b = product(&shape, &volume);
+        let c = product(&volume, &volume) + 1.0 / (material.bulk * stiffness);
+        let determinant = a * c - b * b;
+        let along_shape = (b * excess - c * size) / determinant;
+        let along_volume = (b * size - a * excess) / determinant;
+        for i in 0..4 {
+            let shift = shape[i] * along_shape + volume[i] * along_volume;
+            points[self.nodes[i]] += shift * masses[i];
+        }
     }
 
-    /// One iteration of XPBD on a constraint of value `value` whose derivative by the deformation gradient is `slope`.
-    fn correct(
-        &self,
-        points: &mut [Vector3<f64>],
-        masses: &[f64],
-        value: f64,
-        slope: Matrix3<f64>,
-        compliance: f64,
-    ) {
+    /// The derivatives by the nodes of what has the derivative `slope` by the deformation gradient.
+    fn slopes(&self, slope: Matrix3<f64>) -> [Vector3<f64>; 4] {
         let slopes = slope * self.inverse_rest.transpose();
-        let [a, b, c, d] = self.nodes;
-        let first = -(slopes.column(0) + slopes.column(1) + slopes.column(2));
-        let yielding = masses[a] * first.norm_squared()
-            + masses[b] * slopes.column(0).norm_squared()
-            + masses[c] * slopes.column(1).norm_squared()
-            + masses[d] * slopes.column(2).norm_squared()
-            + compliance;
-        let multiplier = -value / yielding;
-        points[a] += first * (masses[a] * multiplier);
-        for (i, node) in [b, c, d].into_iter().enumerate() {
-            points[node] += slopes.column(i) * (masses[node] * multiplier);
-        }
+        let [b, c, d] = [0, 1, 2].map(|i| slopes.column(i).into_owned());
+        [-(b + c + d), b, c, d]
     }
 }
 
@@ -258,54 +238,6 @@ fn reaches(solid: &Solid, low: Vector3<f64>, spacing: f64) -> bool {
         let at = Vector3::new(i % 4, i / 4 % 4, i / 16).map(|n| (f64::from(n) + 0.5) / 4.0);
         solid.value(&(low + at * spacing)) < 0.0
     })
-}
-
-/// For each point of a surface the nodes it rides on and their weights.
-pub(super) struct Ride {
-    weights: Vec<Vec<(usize, f64)>>,
-}
-
-impl Ride {
-    /// Moving least squares: weights fade smoothly with the distance and vanish at `reach`, and reproduce every affine motion exactly.
-    pub fn new(points: &[Vector3<f64>], nodes: &[Vector3<f64>], reach: f64) -> Self {
-        let weights = points
-            .iter()
-            .map(|p| moving_least_squares(p, nodes, reach))
-            .collect();
-        Self { weights }
-    }
-
-    /// Where the points of the surface go when the nodes are at `nodes`.
-    pub fn carry(&self, nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let carry_one =
-            |row: &Vec<(usize, f64)>| row.iter().map(|&(node, weight)| nodes[node] * weight).sum();
-        self.weights.iter().map(carry_one).collect()
-    }
-}
-
-fn moving_least_squares(
-    point: &Vector3<f64>,
-    nodes: &[Vector3<f64>],
-    reach: f64,
-) -> Vec<(usize, f64)> {
-    let kernel = |node: &Vector3<f64>| {
-        (1.0 - (node - point).norm_squared() / (reach * reach))
-            .max(0.0)
-            .powi(3)
-    };
-    let basis = |node: &Vector3<f64>| (node - point).push(reach);
-    let near: Vec<(usize, f64)> = (0..nodes.len())
-        .map(|v| (v, kernel(&nodes[v])))
-        .filter(|&(_, k)| k > 0.0)
-        .collect();
-    let mut moments = Matrix4::zeros();
-    for &(v, k) in &near {
-        moments += basis(&nodes[v]) * basis(&nodes[v]).transpose() * k;
-    }
-    let solution = moments.try_inverse().unwrap_or_else(Matrix4::zeros) * Vector4::w() * reach;
-    near.iter()
-        .map(|&(v, k)| (v, k * basis(&nodes[v]).dot(&solution)))
-        .collect()
 }
 
 #[cfg(test)]
@@ -385,18 +317,5 @@ mod tests {
         }
         assert!(width(&body.points) < wide - 0.02);
         assert!((mean(&body.points, &body.inverse_masses) - before).norm() < 1e-12);
-    }
-
-    #[test]
-    fn a_ride_follows_affine_motions() {
-        let body = SoftBody::new(&ball(), 0.2, SOFT);
-        let points = [Vector3::new(0.1, 1.3, 0.2), Vector3::new(-0.3, 0.9, 0.0)];
-        let ride = Ride::new(&points, body.rest(), 0.4);
-        let affine =
-            |p: &Vector3<f64>| Vector3::new(2.0 * p.x - p.z + 1.0, p.y + 0.3 * p.x, 0.1 - p.z);
-        let nodes: Vec<_> = body.rest().iter().map(affine).collect();
-        for (p, q) in points.iter().zip(ride.carry(&nodes)) {
-            assert!((affine(p) - q).norm() < 1e-12);
-        }
     }
 }

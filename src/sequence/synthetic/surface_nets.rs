@@ -17,22 +17,27 @@ pub(super) struct Surface {
 }
 
 const NONE: u32 = u32::MAX;
-const RELAXATIONS: usize = 12;
+const RELAXATIONS: usize = 8;
 
 /// Meshes `solid` on a grid of cells of side `spacing`.
 pub(super) fn polygonise(solid: &Solid, spacing: f64) -> Surface {
     let lattice = Lattice::new(solid, spacing);
     let (cells, mut points) = lattice.vertices();
     let quads = lattice.quads(&cells);
-    relax(solid, &quads, &mut points);
-    let faces = quads
-        .iter()
-        .flat_map(|quad| {
-            let [a, b, c, d] = quad.map(|v| points[v as usize]);
-            grid::split(*quad, (a - c).norm() <= (b - d).norm())
-        })
-        .collect();
+    for _ in 0..RELAXATIONS {
+        relax(solid, &triangulate(&quads, &points), &mut points);
+    }
+    let faces = triangulate(&quads, &points);
     Surface { points, faces }
+}
+
+/// Cuts each quad along its shorter diagonal.
+fn triangulate(quads: &[[u32; 4]], points: &[Vector3<f64>]) -> Vec<[u32; 3]> {
+    let split = |quad: &[u32; 4]| {
+        let [a, b, c, d] = quad.map(|v| points[v as usize]);
+        grid::split(*quad, (a - c).norm() <= (b - d).norm())
+    };
+    quads.iter().flat_map(split).collect()
 }
 
 /// The values of a solid at the nodes of a grid, x fastest.
@@ -210,27 +215,25 @@ fn hangs_together(corners: u8) -> bool {
     for _ in 0..8 {
         let x = (reached & 0x55) << 1 | (reached & 0xaa) >> 1;
         let y = (reached & 0x33) << 2 | (reached & 0xcc) >> 2;
-        let z = reached << 4 | reached >> 4;
+        let z = reached.rotate_left(4);
         reached |= (x | y | z) & corners;
     }
     reached == corners
 }
 
-/// Moves each vertex towards the mean of its neighbours along the surface, several times.
-fn relax(solid: &Solid, quads: &[[u32; 4]], points: &mut [Vector3<f64>]) {
-    for _ in 0..RELAXATIONS {
-        let mut sums = vec![(Vector3::zeros(), 0.0); points.len()];
-        for quad in quads {
-            for i in 0..4 {
-                let sum = &mut sums[quad[i] as usize];
-                *sum = (sum.0 + points[quad[(i + 1) % 4] as usize], sum.1 + 1.0);
-            }
+/// Moves each vertex half way towards the mean of its neighbours, along the surface.
+fn relax(solid: &Solid, faces: &[[u32; 3]], points: &mut [Vector3<f64>]) {
+    let mut sums = vec![(Vector3::zeros(), 0.0); points.len()];
+    for face in faces {
+        for i in 0..3 {
+            let sum = &mut sums[face[i] as usize];
+            *sum = (sum.0 + points[face[(i + 1) % 3] as usize], sum.1 + 1.0);
         }
-        for (point, (sum, count)) in points.iter_mut().zip(sums) {
-            let normal = solid.gradient(point).normalize();
-            let step = sum / count - *point;
-            *point = solid.project(*point + 0.5 * (step - normal * normal.dot(&step)), 1);
-        }
+    }
+    for (point, (sum, count)) in points.iter_mut().zip(sums) {
+        let normal = solid.gradient(point).normalize();
+        let step = sum / count - *point;
+        *point = solid.project(*point + 0.5 * (step - normal * normal.dot(&step)), 1);
     }
 }
 
