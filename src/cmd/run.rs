@@ -100,7 +100,6 @@ impl Run {
         fault: Option<&'static inject::Fault>,
         measure: bool,
     ) -> Result<Record, Failure> {
-        let folder = self.folder()?;
         let options = Options {
             home: home(),
             data: DataFolders::new(self.data.as_deref()),
@@ -109,6 +108,7 @@ impl Run {
             measure,
         };
         let mut session = Session::open(options, cases)?;
+        let folder = self.folder()?;
         let bar = progress(cases.len());
         let mut record = session.run(cases, |event| {
             let line = match event {
