@@ -205,9 +205,14 @@ impl Bundle {
 
     /// The first number that is NaN or infinite, as `name[index]`.
     pub fn first_not_finite(&self) -> Option<String> {
+        self.first_beyond(f64::MAX)
+    }
+
+    /// The first number that is NaN or of greater magnitude than this, as `name[index]`.
+    pub fn first_beyond(&self, greatest: f64) -> Option<String> {
         self.0.iter().find_map(|(name, array)| match array {
             Array::F64 { data, .. } => {
-                let at = data.iter().position(|x| !x.is_finite())?;
+                let at = data.iter().position(|x| x.is_nan() || x.abs() > greatest)?;
                 Some(format!("{name}[{at}] = {}", data[at]))
             }
             _ => None,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::output::{say, write_json};
+use super::output::{check_place, draft_json, say};
 use super::{FrameChoice, Outcome};
 use crate::mesh::measure::{bounds, counts, measure_frames};
 
@@ -22,6 +22,7 @@ pub struct Info {
 
 impl Info {
     pub fn run(self) -> Outcome {
+        self.json.as_deref().map_or(Ok(()), check_place)?;
         let sequence = self.frames.open(&self.sequence)?;
         let mesh = sequence.connectivity();
         let c = counts(mesh.vertex_count(), mesh.faces());
@@ -44,6 +45,9 @@ impl Info {
             "area": area, "volume": volume,
             "bounds": {"min": first.min, "max": first.max}, "diagonal": first.diagonal(),
         });
+        if let Some(path) = &self.json {
+            draft_json(path, &value)?.keep()?;
+        }
         say(&format!(
             "{}: {} frames, V = {}, F = {}, E = {}, d = {}",
             self.sequence,
@@ -71,9 +75,6 @@ impl Info {
             first.max,
             first.diagonal()
         ));
-        if let Some(path) = self.json {
-            write_json(&path, &value)?;
-        }
         Ok(true)
     }
 }

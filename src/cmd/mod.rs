@@ -25,7 +25,7 @@ type Outcome = Result<bool, Failure>;
 #[command(name = "meshseq", version, about, max_term_width = 110)]
 struct Cli {
     /// Threads to compute with; all cores if not given. Results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true)]
     threads: Option<usize>,
     #[command(subcommand)]
     verb: Verb,
@@ -66,30 +66,49 @@ enum Verb {
     Signal(signal::Signal),
 }
 
+/// More threads only wait for each other.
+const MOST_THREADS: usize = 1024;
+
 /// Frames of a sequence.
 #[derive(Args, Clone)]
 struct FrameChoice {
     /// Frames to take, 1-based, both ends in, such as 1..24
-    #[arg(long, value_name = "A..B", default_value = "..")]
+    #[arg(
+        long,
+        value_name = "A..B",
+        default_value = "..",
+        allow_hyphen_values = true
+    )]
     frames: String,
     /// Take every S-th of them
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = whole("1 or more"))]
     every: usize,
 }
 
 impl FrameChoice {
     fn open(&self, argument: &str) -> Result<crate::sequence::Sequence, Failure> {
-        let sequence = crate::sequence::dataset::open(argument)?;
-        if self.frames == ".." && self.every == 1 {
-            return Ok(sequence);
-        }
-        let mut frames: crate::harness::case::Frames = self.frames.parse()?;
+        let mut frames: crate::harness::case::Frames =
+            self.frames.parse().map_err(|e| format!("--{e}"))?;
         if self.every == 0 {
             return Err("--every 0: expected at least 1".into());
         }
         frames.step = self.every;
-        let indices = frames.indices(sequence.frame_count())?;
+        let sequence = crate::sequence::dataset::open(argument)?;
+        if self.frames == ".." && self.every == 1 {
+            return Ok(sequence);
+        }
+        let indices = frames
+            .indices(sequence.frame_count())
+            .map_err(|e| format!("{argument}: --{e}"))?;
         Ok(sequence.select(&indices)?)
+    }
+}
+
+/// Reads a whole number; what is none is told the range.
+fn whole(range: &'static str) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse();
+        number.map_err(|_| format!("expected a whole number, {range}"))
     }
 }
 
@@ -97,8 +116,8 @@ impl FrameChoice {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     if let Some(threads) = cli.threads {
-        if threads == 0 {
-            eprintln!("meshseq: --threads 0: expected at least 1");
+        if !(1..=MOST_THREADS).contains(&threads) {
+            eprintln!("meshseq: --threads {threads}: expected 1 to {MOST_THREADS}");
             return ExitCode::from(2);
         }
         // A pool that stands already is the only failure, and then its size stands too.

@@ -108,7 +108,6 @@ impl Run {
         fault: Option<&'static inject::Fault>,
         timing: Timing,
     ) -> Result<Record, Failure> {
-        let folder = self.folder()?;
         let options = Options {
             home: home(),
             data: DataFolders::new(self.data.as_deref()),
@@ -117,6 +116,7 @@ impl Run {
             timing,
         };
         let mut session = Session::open(options, cases)?;
+        let folder = self.folder()?;
         let bar = progress(cases.len());
         let mut record = session.run(cases, |event| {
             let line = match event {

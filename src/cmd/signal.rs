@@ -1,21 +1,27 @@
 //! `signal fit` and `signal sample`.
 
-use std::path::PathBuf;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use faer::MatRef;
 use serde_json::json;
 
-use super::output::{say, write_json};
-use super::{Failure, FrameChoice, Outcome};
+use super::output::{check_place, draft_json, say};
+use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
 use crate::sequence::format::write;
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, load, save};
-use crate::signal::fit::{Fit, FitOptions, fit};
+use crate::signal::fit::{Fit, FitError, FitOptions, fit};
 use crate::signal::knots::KnotRule;
-use crate::signal::pins::Pin;
+use crate::signal::pins::{Pin, validate_pins};
+
+/// More frames are a mistake.
+const MOST_FRAMES: usize = 10_000_000;
+/// More pins than any plane of poses takes; a longer file is none of pins.
+const LONGEST_PINS: u64 = 64 << 20;
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -45,16 +51,16 @@ pub struct FitVerb {
     #[command(flatten)]
     frames: FrameChoice,
     /// Control points of the time signal, 4 to n + 2
-    #[arg(long, requires_all = ["l", "m"])]
+    #[arg(long, requires_all = ["l", "m"], allow_negative_numbers = true, value_parser = whole("4 to n + 2 for n frames"))]
     k: Option<usize>,
     /// Sites of the pose signal, 3 to n
-    #[arg(long, requires_all = ["k", "m"])]
+    #[arg(long, requires_all = ["k", "m"], allow_negative_numbers = true, value_parser = whole("3 to n for n frames"))]
     l: Option<usize>,
     /// Dimension of the shape subspace, 0 to n - 1
-    #[arg(long, requires_all = ["k", "l"])]
+    #[arg(long, requires_all = ["k", "l"], allow_negative_numbers = true, value_parser = whole("0 to n - 1 for n frames"))]
     m: Option<usize>,
     /// Choose k, l, m for this relative RMS error, such as 0.01
-    #[arg(long, value_name = "R", conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
     /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
     #[arg(long, default_value = "symmetric", value_name = "RULE")]
@@ -87,8 +93,17 @@ impl FitVerb {
             )
             .into());
         }
+        for path in self.out.iter().chain(&self.json) {
+            check_place(path)?;
+        }
+        if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
+            return Err(FitError::BadTolerance { value }.into());
+        }
         let sequence = self.frames.open(&self.sequence)?;
-        let pins = self.pins.as_ref().map_or(Ok(Vec::new()), read_pins)?;
+        let pins = match &self.pins {
+            Some(path) => read_pins(path, sequence.frame_count())?,
+            None => Vec::new(),
+        };
         let d = sequence.dimension();
         let frames =
             MatRef::from_column_major_slice(sequence.positions(), d, sequence.frame_count());
@@ -109,7 +124,9 @@ impl FitVerb {
             }
         };
         let numbers = numbers(&sequence, &fitted, knots);
-        say(&describe(&self.sequence, &numbers));
+        // Whatever can fail comes before the first file gets its name.
+        let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
+        let json = json.transpose()?;
         if let Some(out) = &self.out {
             let stored = Stored {
                 representation: fitted.representation,
@@ -118,9 +135,10 @@ impl FitVerb {
             };
             save(&stored, out)?;
         }
-        if let Some(path) = &self.json {
-            write_json(path, &numbers)?;
+        if let Some(json) = json {
+            json.keep()?;
         }
+        say(&describe(&self.sequence, &numbers));
         Ok(true)
     }
 }
@@ -129,11 +147,9 @@ impl FitVerb {
 fn allowed_error(sequence: &Sequence, relative: f64) -> f64 {
     let size = bounds(sequence.frame(0)).diagonal();
     let vertices = sequence.frame_count() * sequence.connectivity().vertex_count();
-    if relative > 0.0 {
-        (relative * size).powi(2) * vertices as f64
-    } else {
-        relative
-    }
+    let allowed = (relative * size).powi(2) * vertices as f64;
+    // So small a tolerance, or a first frame of no size, leaves no error but 0.
+    allowed.clamp(f64::MIN_POSITIVE, f64::MAX)
 }
 
 /// Everything that `--json` holds.
@@ -208,17 +224,40 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
     )
 }
 
-/// Rows `frame,x,y` with 1-based frames.
-fn read_pins(path: &PathBuf) -> Result<Vec<Pin>, Failure> {
+/// Rows `frame,x,y` below a header line, with frames of 1 to n.
+fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
     let place = path.display();
-    let mut reader = csv::Reader::from_path(path).map_err(|e| format!("{place}: {e}"))?;
+    let file = std::fs::File::open(path).map_err(|e| format!("{place}: cannot read pins: {e}"))?;
+    // One byte more than allowed tells a file that is too long; a device never ends.
+    let mut text = String::new();
+    file.take(LONGEST_PINS + 1)
+        .read_to_string(&mut text)
+        .map_err(|e| format!("{place}: cannot read pins: {e}"))?;
+    if text.len() as u64 > LONGEST_PINS {
+        return Err(
+            format!("{place}: more than {LONGEST_PINS} bytes, which pins never have").into(),
+        );
+    }
+    let pins = parse_pins(&text).map_err(|e| {
+        format!("{place}: {e}; expected a line `frame,x,y` and then one such row a pin, frames counted from 1")
+    })?;
+    validate_pins(&pins, n).map_err(|e| format!("{place}: {e}"))?;
+    Ok(pins)
+}
+
+fn parse_pins(text: &str) -> Result<Vec<Pin>, Failure> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let header = reader.headers()?;
+    if header != ["frame", "x", "y"].as_slice() {
+        let found: Vec<String> = header.iter().map(shortened).collect();
+        return Err(format!("the first line is `{}`", found.join(",")).into());
+    }
     let mut pins = Vec::new();
     for row in reader.deserialize() {
-        let (frame, x, y): (usize, f64, f64) =
-            row.map_err(|e| format!("{place}: {e}; expected the columns frame, x, y"))?;
-        let frame = frame
-            .checked_sub(1)
-            .ok_or_else(|| format!("{place}: frames are counted from 1, found 0"))?;
+        let (frame, x, y): (usize, f64, f64) = row?;
+        let frame = frame.checked_sub(1).ok_or("a pin names frame 0")?;
         pins.push(Pin {
             frame,
             position: [x, y],
@@ -227,15 +266,25 @@ fn read_pins(path: &PathBuf) -> Result<Vec<Pin>, Failure> {
     Ok(pins)
 }
 
+/// The beginning of what may be very long.
+fn shortened(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
 #[derive(Args)]
 pub struct SampleVerb {
     /// A representation that `signal fit` wrote
     representation: PathBuf,
     /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
-    #[arg(long, value_name = "N", conflicts_with = "times")]
+    #[arg(long, value_name = "N", conflicts_with = "times", allow_negative_numbers = true, value_parser = whole("1 or more"))]
     count: Option<usize>,
     /// Frame times in [1, n], separated by commas
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "T,T,..",
+        value_delimiter = ',',
+        allow_negative_numbers = true
+    )]
     times: Vec<f64>,
     /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
     #[arg(short, long, value_name = "OUT")]
@@ -247,8 +296,10 @@ impl SampleVerb {
         let stored = load(&self.representation)?;
         let n = stored.representation.time.frame_count() as f64;
         let times = self.frame_times(n)?;
+        check_memory(times.len(), stored.representation.dimension())?;
         let frames = stored.representation.evaluate(&times);
-        let sequence = Sequence::new(stored.connectivity, times.len(), frames)?;
+        let sequence = Sequence::new(stored.connectivity, times.len(), frames)
+            .map_err(|e| format!("{}: sampled, {e}", self.representation.display()))?;
         write(&sequence, &self.out)?;
         say(&format!("{}: {} frames", self.out.display(), times.len()));
         Ok(true)
@@ -256,14 +307,14 @@ impl SampleVerb {
 
     fn frame_times(&self, n: f64) -> Result<Vec<f64>, Failure> {
         if let Some(t) = self.times.iter().find(|t| !(1.0..=n).contains(*t)) {
-            return Err(format!("time {t}, expected frame times in [1, {n}]").into());
+            return Err(format!("--times {t}: expected frame times from 1 to {n}").into());
         }
         if !self.times.is_empty() {
             return Ok(self.times.clone());
         }
         let count = self.count.unwrap_or(n as usize);
-        if count == 0 || count > 10_000_000 {
-            return Err(format!("--count {count}, expected 1 to 10000000").into());
+        if count == 0 || count > MOST_FRAMES {
+            return Err(format!("--count {count}: expected 1 to {MOST_FRAMES}").into());
         }
         let step = if count > 1 {
             (n - 1.0) / (count - 1) as f64
@@ -272,4 +323,18 @@ impl SampleVerb {
         };
         Ok((0..count).map(|i| (1.0 + i as f64 * step).min(n)).collect())
     }
+}
+
+/// An error where that many frames of d numbers do not fit into memory.
+fn check_memory(frames: usize, d: usize) -> Result<(), Failure> {
+    let numbers = frames.checked_mul(d);
+    let fits = numbers.is_some_and(|count| Vec::<f64>::new().try_reserve_exact(count).is_ok());
+    if fits {
+        return Ok(());
+    }
+    let gigabytes = frames as f64 * d as f64 * 8e-9;
+    Err(format!(
+        "{frames} frames of {d} numbers, {gigabytes:.0} GB, do not fit into memory; sample fewer at a time with --times"
+    )
+    .into())
 }

@@ -1,6 +1,6 @@
 //! Cases: a stage, a dataset, its parameters and its checks, as TOML in `bench/cases/`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -188,17 +188,20 @@ fn read_file(root: &Path, path: &Path) -> Result<Vec<Case>, CaseError> {
         .unwrap_or(&stem)
         .to_string_lossy()
         .into_owned();
-    file.cases
-        .into_iter()
-        .map(|entry| {
-            let name = entry.name.clone();
-            validate(entry, &prefix).map_err(|what| CaseError::Wrong {
-                path: path.to_owned(),
-                case: name,
-                what,
-            })
+    let mut names = BTreeSet::new();
+    let case = |entry: Entry| {
+        let name = entry.name.clone();
+        let checked = match names.insert(name.clone()) {
+            true => validate(entry, &prefix),
+            false => Err("another case of this file has the same name".into()),
+        };
+        checked.map_err(|what| CaseError::Wrong {
+            path: path.to_owned(),
+            case: name,
+            what,
         })
-        .collect()
+    };
+    file.cases.into_iter().map(case).collect()
 }
 
 fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
@@ -214,6 +217,9 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
             known.join(", ")
         )
     })?;
+    if entry.timeout_seconds == 0 {
+        return Err("timeout_seconds = 0, expected at least 1".into());
+    }
     Ok(Case {
         name: format!("{prefix}/{}", entry.name),
         stage: stage.name,
@@ -304,7 +310,12 @@ fn tolerances(
 /// `A..B`, `A..`, `..B` or `A`.
 fn frames(text: Option<&str>, step: usize) -> Result<Frames, String> {
     let range = text.unwrap_or("..");
-    let wrong = || format!("frames `{range}`: expected A..B with 1 <= A <= B");
+    let wrong = || {
+        format!("frames `{range}`: expected A..B with 1 <= A <= B, counted from 1, both ends in")
+    };
+    if step == 0 {
+        return Err("every = 0: expected every S-th frame with S at least 1".into());
+    }
     let number = |text: &str, absent: Option<usize>| match text {
         "" => Ok(absent),
         text => text.parse().map(Some).map_err(|_| wrong()),
@@ -314,7 +325,7 @@ fn frames(text: Option<&str>, step: usize) -> Result<Frames, String> {
         None => (number(range, None)?, number(range, None)?),
     };
     let first = first.filter(|&f| f >= 1).ok_or_else(wrong)?;
-    if last.is_some_and(|last| last < first) || step == 0 {
+    if last.is_some_and(|last| last < first) {
         return Err(wrong());
     }
     Ok(Frames { first, last, step })
@@ -346,8 +357,9 @@ impl Frames {
     pub fn indices(&self, n: usize) -> Result<Vec<usize>, String> {
         let last = self.last.unwrap_or(n);
         if self.first > n || last > n {
+            let last = self.last.map_or(String::new(), |last| last.to_string());
             return Err(format!(
-                "frames {}..{last} of a sequence of {n} frames",
+                "frames {}..{last}: the sequence has frames 1..{n}; choose among them",
                 self.first
             ));
         }

@@ -16,6 +16,10 @@ use crate::stages::Stage;
 /// How much of a program's last words is kept.
 const STDERR_LINES: usize = 12;
 const STDERR_LINE: usize = 300;
+/// How long a program that has closed its output may take to be gone, and one that is gone to be heard to the end.
+const FAREWELL: Duration = Duration::from_secs(1);
+/// Numbers beyond this overflow when they are squared, and are no answer.
+const GREATEST: f64 = 1e150;
 
 /// What an engine is asked.
 pub struct Question<'a> {
@@ -37,6 +41,18 @@ pub enum Outcome {
     Missing(String),
 }
 
+impl Outcome {
+    /// Why there is no answer; empty where there is one.
+    pub fn reason(&self) -> &str {
+        match self {
+            Self::Answer { .. } => "",
+            Self::Unsupported(why) | Self::Error(why) | Self::Timeout(why) | Self::Missing(why) => {
+                why
+            }
+        }
+    }
+}
+
 /// Something that can run a stage.
 pub trait Engine: Send {
     /// As in reports and in `--engine`.
@@ -45,8 +61,9 @@ pub trait Engine: Send {
     fn stages(&self) -> Vec<String>;
     /// What makes it independent.
     fn descent(&self) -> &str;
-    /// Its receipt, or why it is missing and what brings it here.
-    fn version(&mut self) -> Result<String, String>;
+    /// Its receipt. Without one: `Missing` where it cannot be started or ends at once, with what brings it here; `Timeout` or `Error` where it is
+    /// here and misbehaves.
+    fn version(&mut self) -> Result<String, Outcome>;
     /// Runs the stage. Never panics, never takes much longer than the timeout.
     fn ask(&mut self, question: &Question) -> Outcome;
 }
@@ -70,9 +87,9 @@ pub fn sample(question: &Question) -> Outcome {
     checked(call.outputs(), seconds)
 }
 
-/// An answer with NaN or infinity in it is none.
+/// An answer with NaN, infinity or what soon becomes one in it is none.
 fn checked(outputs: Bundle, seconds: Vec<f64>) -> Outcome {
-    match outputs.first_not_finite() {
+    match outputs.first_beyond(GREATEST) {
         Some(place) => Outcome::Error(format!("the answer is not finite: {place}")),
         None => Outcome::Answer { outputs, seconds },
     }
@@ -94,7 +111,7 @@ impl Engine for Rust {
         "this crate"
     }
 
-    fn version(&mut self) -> Result<String, String> {
+    fn version(&mut self) -> Result<String, Outcome> {
         Ok(format!(
             "meshseq {}, {} threads",
             env!("CARGO_PKG_VERSION"),
@@ -117,7 +134,9 @@ struct Running {
     child: Child,
     requests: Sender<Bundle>,
     replies: Receiver<Result<Bundle, WireError>>,
-    last_words: Arc<Mutex<VecDeque<String>>>,
+    last_words: Arc<Mutex<LastWords>>,
+    /// Closed when standard error has been heard to its end.
+    hearing: Receiver<()>,
 }
 
 impl OracleProcess {
@@ -136,41 +155,67 @@ impl OracleProcess {
         self.running.as_mut().ok_or_else(|| "not started".into())
     }
 
-    /// One request and its reply; a program that fails at it is stopped, so that the next question finds a fresh one.
-    fn exchange(&mut self, request: Bundle, timeout: Duration) -> Result<Bundle, Outcome> {
-        let install = self.oracle.install.clone();
-        let running = self
-            .start()
-            .map_err(|why| Outcome::Missing(format!("{why}; to get it: {install}")))?;
-        // A writer that is gone is noticed when the reply does not come.
-        let _ = running.requests.send(request);
-        let failure = match running.replies.recv_timeout(timeout) {
-            Ok(Ok(reply)) => return Ok(reply),
-            Ok(Err(error)) => {
-                // A program that ended says why on its last line; give it a moment to arrive.
-                thread::sleep(Duration::from_millis(50));
-                Outcome::Error(format!("{error}{}", running.said()))
+    /// One request and its reply; a program that fails at it is stopped, so that the next question finds a fresh one. `ended` is what it means
+    /// when the program ends instead.
+    fn exchange(
+        &mut self,
+        request: Bundle,
+        timeout: Duration,
+        ended: fn(String) -> Outcome,
+    ) -> Result<Bundle, Outcome> {
+        let running = self.start().map_err(Outcome::Missing)?;
+        let failure = match running.replies.try_recv() {
+            Ok(Ok(_)) => (
+                Outcome::Error as fn(String) -> Outcome,
+                "it wrote a message that nobody asked for".into(),
+            ),
+            // It may have ended since its last answer.
+            Ok(Err(error)) => (ended, error.to_string()),
+            Err(_) => {
+                // A writer that is gone is noticed when the reply does not come.
+                let _ = running.requests.send(request);
+                match running.replies.recv_timeout(timeout) {
+                    Ok(Ok(reply)) => return Ok(reply),
+                    Ok(Err(WireError::End)) => (ended, running.end()),
+                    Ok(Err(error)) => (Outcome::Error as _, error.to_string()),
+                    Err(RecvTimeoutError::Timeout) => {
+                        (Outcome::Timeout as _, format!("no answer in {timeout:?}"))
+                    }
+                    Err(RecvTimeoutError::Disconnected) => {
+                        (Outcome::Error as _, "its reader is gone".into())
+                    }
+                }
             }
-            Err(RecvTimeoutError::Timeout) => {
-                Outcome::Timeout(format!("no answer in {timeout:?}{}", running.said()))
-            }
-            Err(RecvTimeoutError::Disconnected) => Outcome::Error("its reader is gone".into()),
         };
+        let (outcome, what) = failure;
+        let said = running.stop();
         self.running = None;
-        Err(failure)
+        Err(outcome(format!("{what}{said}")))
     }
 }
 
 impl Running {
-    fn said(&self) -> String {
-        let Ok(lines) = self.last_words.lock() else {
-            return String::new();
-        };
-        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
-        if lines.is_empty() {
-            String::new()
-        } else {
-            format!("; it last said: {}", lines.join(" | "))
+    /// How the program ended, after it has closed its output.
+    fn end(&mut self) -> String {
+        let deadline = Instant::now() + FAREWELL;
+        while Instant::now() < deadline {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return format!("it ended without an answer ({status})");
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+        "it closed its output without an answer".into()
+    }
+
+    /// Ends the program, and what it last said.
+    fn stop(&mut self) -> String {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        // Nothing is ever sent; the wait is for the sender to be dropped.
+        let _ = self.hearing.recv_timeout(FAREWELL);
+        match self.last_words.lock() {
+            Ok(words) => words.text(),
+            Err(_) => String::new(),
         }
     }
 }
@@ -199,7 +244,8 @@ fn start(oracle: &Oracle) -> Result<Running, String> {
     };
     let (requests, inbox) = channel::<Bundle>();
     let (outbox, replies) = channel();
-    let last_words = Arc::new(Mutex::new(VecDeque::new()));
+    let (heard, hearing) = channel();
+    let last_words = Arc::new(Mutex::new(LastWords::default()));
     thread::spawn(move || {
         let mut stdin = BufWriter::new(stdin);
         while let Ok(request) = inbox.recv() {
@@ -219,44 +265,69 @@ fn start(oracle: &Oracle) -> Result<Running, String> {
         }
     });
     let words = last_words.clone();
-    thread::spawn(move || keep_last_lines(stderr, &words));
+    thread::spawn(move || {
+        hear(stderr, &words);
+        drop(heard);
+    });
     Ok(Running {
         child,
         requests,
         replies,
         last_words,
+        hearing,
     })
 }
 
 /// Reads to the end in small pieces, so that a program which never ends a line takes no memory.
-fn keep_last_lines(mut stream: impl Read, lines: &Mutex<VecDeque<String>>) {
+fn hear(mut stream: impl Read, words: &Mutex<LastWords>) {
     let mut buffer = [0; 4096];
-    let mut line = String::new();
     while let Ok(count) = stream.read(&mut buffer) {
+        let Ok(mut words) = words.lock() else { return };
         if count == 0 {
             break;
         }
-        for c in String::from_utf8_lossy(&buffer[..count]).chars() {
-            if c != '\n' {
-                if line.len() < STDERR_LINE {
-                    line.push(c);
-                }
-                continue;
-            }
-            let Ok(mut lines) = lines.lock() else { return };
-            if !line.trim().is_empty() {
-                lines.push_back(std::mem::take(&mut line));
-            }
-            line.clear();
-            if lines.len() > STDERR_LINES {
-                lines.pop_front();
+        words.add(&String::from_utf8_lossy(&buffer[..count]));
+    }
+}
+
+/// The beginnings of the last lines of a stream.
+#[derive(Default)]
+struct LastWords {
+    lines: VecDeque<String>,
+    /// The line that has not ended yet.
+    line: String,
+}
+
+impl LastWords {
+    fn add(&mut self, text: &str) {
+        for c in text.chars() {
+            if c == '\n' {
+                self.end_line();
+            } else if self.line.len() < STDERR_LINE {
+                self.line.push(if c.is_control() { ' ' } else { c });
             }
         }
     }
-    if let Ok(mut lines) = lines.lock()
-        && !line.trim().is_empty()
-    {
-        lines.push_back(line);
+
+    fn end_line(&mut self) {
+        let line = std::mem::take(&mut self.line);
+        if !line.trim().is_empty() {
+            self.lines.push_back(line);
+        }
+        if self.lines.len() > STDERR_LINES {
+            self.lines.pop_front();
+        }
+    }
+
+    /// For the end of a message; empty where nothing was said.
+    fn text(&self) -> String {
+        let lines = self.lines.iter().chain([&self.line]);
+        let lines: Vec<&str> = lines.map(|l| l.trim()).filter(|l| !l.is_empty()).collect();
+        if lines.is_empty() {
+            String::new()
+        } else {
+            format!("; it last said: {}", lines.join(" | "))
+        }
     }
 }
 
@@ -273,21 +344,21 @@ impl Engine for OracleProcess {
         &self.oracle.descent
     }
 
-    fn version(&mut self) -> Result<String, String> {
+    fn version(&mut self) -> Result<String, Outcome> {
         let request = Bundle::from([("op", Array::Text("version".into()))]);
-        let reply =
-            self.exchange(request, Duration::from_secs(60))
-                .map_err(|outcome| match outcome {
-                    Outcome::Missing(why) => why,
-                    Outcome::Error(why) | Outcome::Timeout(why) => {
-                        format!("{why}; to get it: {}", self.oracle.install)
-                    }
-                    other => format!("{other:?}"),
-                })?;
-        reply
-            .text("version")
-            .map(str::to_owned)
-            .map_err(|error| error.to_string())
+        let timeout = Duration::from_secs(self.oracle.start_seconds);
+        let receipt =
+            self.exchange(request, timeout, Outcome::Missing)
+                .and_then(|reply| match reply.text("version") {
+                    Ok(version) => Ok(version.to_owned()),
+                    Err(error) => Err(Outcome::Error(error.to_string())),
+                });
+        let install = &self.oracle.install;
+        let advised = |why: String| format!("{why}; to get it: {install}");
+        receipt.map_err(|outcome| match outcome {
+            Outcome::Missing(why) => Outcome::Missing(advised(why)),
+            other => other,
+        })
     }
 
     fn ask(&mut self, question: &Question) -> Outcome {
@@ -300,7 +371,7 @@ impl Engine for OracleProcess {
         for (name, array) in &question.inputs.0 {
             request.put(&format!("in.{name}"), array.clone());
         }
-        match self.exchange(request, question.timeout) {
+        match self.exchange(request, question.timeout, Outcome::Error) {
             Ok(reply) => read_reply(reply, question.samples),
             Err(outcome) => outcome,
         }
@@ -325,7 +396,7 @@ fn read_reply(reply: Bundle, samples: usize) -> Outcome {
         Ok(seconds) => seconds.to_vec(),
         Err(error) => return Outcome::Error(error.to_string()),
     };
-    if seconds.len() != samples || seconds.iter().any(|&s| s.is_nan() || s <= 0.0) {
+    if seconds.len() != samples || seconds.iter().any(|&s| !(s > 0.0 && s.is_finite())) {
         return Outcome::Error(format!(
             "expected {samples} positive times, found {seconds:?}"
         ));

@@ -250,7 +250,7 @@ impl Engine for Faulty {
         "this crate, with a fault"
     }
 
-    fn version(&mut self) -> Result<String, String> {
+    fn version(&mut self) -> Result<String, Outcome> {
         Ok(format!(
             "{}, wrong on purpose: {}",
             Rust.version()?,

@@ -51,12 +51,12 @@ pub fn measure(
         .fold(1e-6, f64::max);
     let rounds = ((BUDGET_SECONDS / slowest) as usize).clamp(ROUNDS.0, ROUNDS.1);
     for _ in 0..rounds {
-        for run in &mut runs {
-            let engine = engines[run.place].as_mut();
-            if let Some(seconds) = timed(engine, run.batch, run.warm) {
-                run.seconds.push(seconds);
-            }
-        }
+        // An engine that fails now is asked no more and has no time.
+        runs.retain_mut(|run| {
+            let seconds = timed(engines[run.place].as_mut(), run.batch, run.warm);
+            run.seconds.extend(seconds);
+            seconds.is_some()
+        });
     }
     rows(case, engines, &runs)
 }

@@ -25,7 +25,7 @@ impl Engine for Tobj {
         "the tobj crate's OBJ reader, f32; vertices no face uses are dropped"
     }
 
-    fn version(&mut self) -> Result<String, String> {
+    fn version(&mut self) -> Result<String, Outcome> {
         Ok("tobj 4, in this process".into())
     }
 

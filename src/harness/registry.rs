@@ -21,6 +21,9 @@ pub struct Oracle {
     /// Threads of its linear algebra.
     #[serde(default = "one")]
     pub threads: usize,
+    /// How long it may take to start and give its receipt.
+    #[serde(default = "a_minute")]
+    pub start_seconds: u64,
     /// Where it is started.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -28,6 +31,10 @@ pub struct Oracle {
 
 fn one() -> usize {
     1
+}
+
+fn a_minute() -> u64 {
+    60
 }
 
 #[derive(Deserialize)]

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use thiserror::Error;
 
 use super::case::Case;
-use super::engine::{self, Engine};
+use super::engine::{self, Engine, Outcome};
 use super::inject::{Fault, Faulty};
 use super::measure::measure;
 use super::record::{EngineRow, FitFigures, Record, Verdict};
@@ -73,7 +73,7 @@ pub enum SessionError {
 /// Engines, their receipts, and the dataset used last.
 pub struct Session {
     engines: Vec<Box<dyn Engine>>,
-    versions: Vec<Result<String, String>>,
+    versions: Vec<Result<String, Outcome>>,
     options: Options,
     scratch: TempDir,
     last: Option<(String, Sequence)>,
@@ -112,7 +112,7 @@ impl Session {
             let answer = |thread: std::thread::ScopedJoinHandle<'_, _>| {
                 thread
                     .join()
-                    .unwrap_or_else(|_| Err("asking it failed".into()))
+                    .unwrap_or_else(|_| Err(Outcome::Error("asking it failed".into())))
             };
             asked.into_iter().map(answer).collect()
         });
@@ -134,8 +134,8 @@ impl Session {
                 engine: engine.name().into(),
                 stages,
                 descent: engine.descent().into(),
-                version: version.clone().unwrap_or_default(),
-                missing: version.clone().err().unwrap_or_default(),
+                version: version.as_deref().unwrap_or_default().to_owned(),
+                missing: version.as_ref().err().map_or("", Outcome::reason).into(),
             });
         }
         rows

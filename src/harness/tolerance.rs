@@ -43,6 +43,7 @@ tolerances! {
         "projection" <= 1e-10, "coordinates are projections, up to the orthonormality lost";
         "sign" <= 0.0, "the entry of largest magnitude is positive (reading 9)";
         "too_many_dimensions" <= 0.0, "at most m";
+        "too_few_dimensions" <= 1e-18, "fewer than m leave only what lies below the rank's bound, squared";
         "error_h_difference" <= 1e-10, "second order in the error of the subspace";
         "dimension_difference" <= 0.0, "m is cut to the rank by one rule (PROTOCOL.md)";
         "sigma_difference" <= 1e-10, "over the norm of the data";
@@ -107,6 +108,9 @@ tolerances! {
     }
     "signal" {
         "claimed_error_psi" <= 1e-9, "error (2) again from the frames";
+        "claimed_error_h" <= 1e-10, "error (3) again from singular values";
+        "claimed_error_g" <= 1e-7, "error (4) again from an SVD's coordinates, at the claimed positions and sites";
+        "claimed_error_f" <= 1e-9, "error (7) again at the claimed positions";
         "error_h_difference" <= 1e-10, "as signal.h";
         "error_g_difference" <= 1e-7, "positions agree to 1e-8 (signal.mds)";
         "error_f_difference" <= 1e-6, "positions agree to 1e-8, and the square root of the parameters magnifies short steps";

@@ -18,12 +18,12 @@ pub struct Judged {
 
 /// Asks every engine that has the stage, Rust first, and judges the answers.
 ///
-/// `versions` holds the receipts of the engines, by name and place in the list; an engine without one is missing.
+/// `versions` holds the receipts of the engines, by place in the list; an engine without one is not asked.
 pub fn verify(
     case: &Case,
     inputs: &Bundle,
     engines: &mut [Box<dyn Engine>],
-    versions: &[Result<String, String>],
+    versions: &[Result<String, Outcome>],
 ) -> Vec<Judged> {
     let Some(stage) = stages::find(case.stage) else {
         return Vec::new();
@@ -36,9 +36,9 @@ pub fn verify(
         }
         let outcome = match version {
             Ok(_) => engine.ask(&question(case, stage, inputs)),
-            Err(why) => Outcome::Missing(why.clone()),
+            Err(outcome) => outcome.clone(),
         };
-        let receipt = version.clone().unwrap_or_default();
+        let receipt = version.as_deref().unwrap_or_default().to_owned();
         let result = judge_one(case, engine.name(), receipt, inputs, outcome, &mut ours);
         judged.push(result);
     }

@@ -7,8 +7,8 @@ use thiserror::Error;
 use crate::arrays::{Array, Bundle};
 
 const MAGIC: &[u8; 4] = b"MSEQ";
-/// No message is longer than this; what claims to be is garbage.
-const LONGEST: u64 = 8 << 30;
+/// No message holds more bytes than this; what claims to is garbage.
+const LONGEST: u64 = 4 << 30;
 const MOST_RECORDS: u32 = 1000;
 const MOST_DIMENSIONS: u8 = 8;
 /// Memory is taken as bytes arrive, this many at a time, never because a header asks for it.
@@ -75,6 +75,11 @@ fn write_numbers<T: Copy>(
 
 /// Reads the next message.
 pub fn read_message(stream: &mut impl Read) -> Result<Bundle, WireError> {
+    read_bounded(stream, LONGEST)
+}
+
+/// `left` are the bytes that the message's arrays may hold.
+fn read_bounded(stream: &mut impl Read, mut left: u64) -> Result<Bundle, WireError> {
     let mut magic = [0; 4];
     let first = stream.read(&mut magic[..1])?;
     if first == 0 {
@@ -94,7 +99,7 @@ pub fn read_message(stream: &mut impl Read) -> Result<Bundle, WireError> {
     }
     let mut bundle = Bundle::default();
     for _ in 0..count {
-        let (name, array) = read_record(stream)?;
+        let (name, array) = read_record(stream, &mut left)?;
         if bundle.0.contains_key(&name) {
             return Err(WireError::Garbage(format!("two records named `{name}`")));
         }
@@ -109,7 +114,8 @@ fn read<const N: usize>(stream: &mut impl Read) -> io::Result<[u8; N]> {
     Ok(bytes)
 }
 
-fn read_record(stream: &mut impl Read) -> Result<(String, Array), WireError> {
+/// `left` are the bytes that the message may still hold.
+fn read_record(stream: &mut impl Read, left: &mut u64) -> Result<(String, Array), WireError> {
     let length = u16::from_le_bytes(read(stream)?);
     let name = text(read_bytes(stream, length.into())?)?;
     let [dtype, rank] = read(stream)?;
@@ -125,8 +131,9 @@ fn read_record(stream: &mut impl Read) -> Result<(String, Array), WireError> {
     let bytes = shape
         .iter()
         .try_fold(width, |size: u64, &extent| size.checked_mul(extent))
-        .filter(|&size| size <= LONGEST)
+        .filter(|size| size <= left)
         .ok_or_else(|| WireError::Garbage(format!("`{name}` claims the shape {shape:?}")))?;
+    *left -= bytes;
     let payload = read_bytes(stream, bytes as usize)?;
     let shape = shape.iter().map(|&extent| extent as usize).collect();
     let array = match dtype {
@@ -217,6 +224,17 @@ mod tests {
         assert!(matches!(
             read_message(&mut &b"hello world"[..]),
             Err(WireError::Garbage(_))
+        ));
+    }
+
+    #[test]
+    fn the_bytes_of_all_records_count() {
+        let one = Array::vector(&[1.0; 10]);
+        let message = bytes(&Bundle::from([("a", one.clone()), ("b", one)]));
+        assert!(read_bounded(&mut &message[..], 160).is_ok());
+        assert!(matches!(
+            read_bounded(&mut &message[..], 159),
+            Err(WireError::Garbage(what)) if what.contains("`b` claims")
         ));
     }
 

@@ -37,6 +37,9 @@ pub enum SplineError {
         "expected at least 6 non-decreasing finite knots with u_2 < u_(k-1), found {found} knots of which number {at} (0-based) breaks this"
     )]
     BadKnots { found: usize, at: usize },
+    /// Another number of knots than the control points ask for.
+    #[error("expected {expected} knots, two more than control points, found {found}")]
+    KnotCount { found: usize, expected: usize },
     /// Another number of parameters than of points.
     #[error("expected a parameter for each of {points} points, found {parameters}")]
     LengthMismatch { parameters: usize, points: usize },
@@ -183,6 +186,15 @@ impl Spline {
             control,
             knots: knots.to_vec(),
         })
+    }
+
+    /// Whether the knots are knots, and two more than the control points.
+    pub fn check(&self) -> Result<(), SplineError> {
+        let (found, expected) = (self.knots.len(), self.control.len() + 2);
+        if found != expected {
+            return Err(SplineError::KnotCount { found, expected });
+        }
+        Basis::new(&self.knots).map(|_| ())
     }
 
     /// f~(u); beyond the domain the end points hold. O(log k).

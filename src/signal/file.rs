@@ -20,7 +20,7 @@ use faer::{Mat, MatRef};
 use thiserror::Error;
 
 use super::Point;
-use super::f::Spline;
+use super::f::{Spline, SplineError};
 use super::g::PoseSignal;
 use super::psi::{Representation, TimeSignal};
 use crate::arrays::{Array, ArrayError, Bundle};
@@ -28,6 +28,7 @@ use crate::mesh::{Connectivity, ConnectivityError};
 use crate::sequence::format::{FormatError, npz};
 
 const FORMAT: &str = "meshseq signal 1";
+const SPACE: &str = "vertex";
 
 /// A representation and the mesh it deforms.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +54,9 @@ pub enum RepresentationError {
         path: String,
         source: ConnectivityError,
     },
+    /// See [`SplineError`].
+    #[error("{path}: `u` and `control` are no time signal: {source}")]
+    Spline { path: String, source: SplineError },
     /// Arrays that do not fit together.
     #[error("{path}: {what}; expected a representation as `meshseq signal fit` writes it")]
     Inconsistent { path: String, what: String },
@@ -62,7 +66,7 @@ pub enum RepresentationError {
 pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
     let r = &stored.representation;
     let faces = stored.connectivity.faces();
-    let meta = serde_json::json!({"format": FORMAT, "space": "vertex"}).to_string();
+    let meta = serde_json::json!({"format": FORMAT, "space": SPACE}).to_string();
     let arrays = [
         ("h0", Array::vector(&r.offset)),
         ("H", Array::columns(r.basis.as_ref())),
@@ -98,10 +102,22 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
             path: place.clone(),
             source,
         })?;
-    let (representation, positions) = stored;
-    if let Some(what) = mismatch(&representation, &positions, &bundle) {
+    let (representation, positions, meta) = stored;
+    let what = mismatch(&representation, &positions)
+        .or_else(|| foreign(&meta))
+        .or_else(|| {
+            bundle
+                .first_not_finite()
+                .map(|found| format!("{found} is not finite"))
+        });
+    if let Some(what) = what {
         return Err(RepresentationError::Inconsistent { path: place, what });
     }
+    let spline = representation.time.spline.check();
+    spline.map_err(|source| RepresentationError::Spline {
+        path: place.clone(),
+        source,
+    })?;
     let connectivity =
         Connectivity::new(representation.dimension() / 3, faces).map_err(|source| {
             RepresentationError::Connectivity {
@@ -116,7 +132,7 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
     })
 }
 
-fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>), ArrayError> {
+fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>, String), ArrayError> {
     let spline = Spline {
         control: bundle.points("control")?,
         knots: bundle.vector("u")?.to_vec(),
@@ -130,7 +146,11 @@ fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>), ArrayError> {
         offset: bundle.vector("h0")?.to_vec(),
         basis: transposed(bundle, "H")?,
     };
-    Ok((representation, bundle.points("p")?))
+    Ok((
+        representation,
+        bundle.points("p")?,
+        bundle.text("meta")?.to_owned(),
+    ))
 }
 
 fn transposed(bundle: &Bundle, name: &str) -> Result<Mat<f64>, ArrayError> {
@@ -138,10 +158,10 @@ fn transposed(bundle: &Bundle, name: &str) -> Result<Mat<f64>, ArrayError> {
     Ok(MatRef::from_column_major_slice(data, shape[1], shape[0]).to_owned())
 }
 
-fn mismatch(r: &Representation, positions: &[Point], bundle: &Bundle) -> Option<String> {
+/// What does not fit together.
+fn mismatch(r: &Representation, positions: &[Point]) -> Option<String> {
     let (d, m) = r.basis.shape();
-    let meta: serde_json::Value =
-        serde_json::from_str(bundle.text("meta").ok()?).unwrap_or_default();
+    let t = &r.time.parameters;
     let pairs = [
         ("length of `h0`", r.offset.len(), "columns of `H`", d),
         (
@@ -156,32 +176,28 @@ fn mismatch(r: &Representation, positions: &[Point], bundle: &Bundle) -> Option<
             "rows of `sites` + 3",
             r.pose.sites.len() + 3,
         ),
-        (
-            "length of `u`",
-            r.time.spline.knots.len(),
-            "rows of `control` + 2",
-            r.time.spline.control.len() + 2,
-        ),
-        (
-            "rows of `p`",
-            positions.len(),
-            "length of `t`",
-            r.time.parameters.len(),
-        ),
+        ("rows of `p`", positions.len(), "length of `t`", t.len()),
     ];
     if let Some((a, x, b, y)) = pairs.into_iter().find(|(_, x, _, y)| x != y) {
         return Some(format!("{a} is {x} but {b} is {y}"));
     }
-    if meta["format"] != FORMAT {
-        return Some(format!(
-            "`meta` has the format {}, expected \"{FORMAT}\"",
-            meta["format"]
-        ));
+    if d % 3 != 0 || d == 0 || t.is_empty() {
+        return Some("it has no vertices or no frames".into());
     }
-    if d % 3 != 0 || d == 0 || r.time.parameters.is_empty() || r.time.spline.control.len() < 4 {
-        return Some("it has no vertices, no frames or fewer than 4 control points".into());
-    }
-    bundle
-        .first_not_finite()
-        .map(|place| format!("{place} is not finite"))
+    let falls = (1..t.len()).find(|&i| t[i] < t[i - 1])?;
+    Some(format!("`t` falls at {falls} (0-based)"))
+}
+
+/// What says that the arrays mean something else.
+fn foreign(meta: &str) -> Option<String> {
+    let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
+    [("format", FORMAT), ("space", SPACE)]
+        .into_iter()
+        .find(|(key, expected)| meta[key] != *expected)
+        .map(|(key, expected)| {
+            format!(
+                "`meta` has the {key} {}, expected \"{expected}\"",
+                meta[key]
+            )
+        })
 }

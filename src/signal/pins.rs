@@ -33,9 +33,10 @@ pub enum PinError {
     },
 }
 
-/// Frames are named 1-based in errors, as the paper counts them. The same pin given twice is one pin.
+/// Frames are named 1-based in errors, as the paper counts them. The same pin given twice is one pin. O(pins + frames).
 pub fn validate_pins(pins: &[Pin], frames: usize) -> Result<(), PinError> {
-    for (i, pin) in pins.iter().enumerate() {
+    let mut held = vec![None; frames];
+    for pin in pins {
         let frame = pin.frame + 1;
         let position = pin.position;
         if pin.frame >= frames {
@@ -44,13 +45,11 @@ pub fn validate_pins(pins: &[Pin], frames: usize) -> Result<(), PinError> {
         if !position.iter().all(|x| x.is_finite()) {
             return Err(PinError::NotFinite { frame, position });
         }
-        let other = pins[..i]
-            .iter()
-            .find(|other| other.frame == pin.frame && other.position != position);
-        if let Some(other) = other {
+        let first = *held[pin.frame].get_or_insert(position);
+        if first != position {
             return Err(PinError::Contradiction {
                 frame,
-                first: other.position,
+                first,
                 second: position,
             });
         }

@@ -31,7 +31,10 @@ pub fn read_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Arra
         .chunks(8)
         .filter(|m| m[0] < 0.0 || m[2] > m[5] || m[3] > m[6] || m[4] > m[7]);
     Ok(vec![
-        ("vertices", counts.iter().step_by(3).sum::<i64>() as f64),
+        (
+            "vertices",
+            counts.iter().step_by(3).map(|&c| c as f64).sum(),
+        ),
         ("impossible", impossible.count() as f64),
     ])
 }

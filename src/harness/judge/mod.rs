@@ -4,6 +4,7 @@
 
 mod chain;
 mod distance;
+mod pipeline;
 mod pose;
 mod scaling;
 mod shape;
@@ -39,7 +40,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.spline" => (time::spline_own, time::spline_against),
         "signal.rho" => (time::rho_own, time::rho_against),
         "signal.psi" => (chain::psi_own, chain::psi_against),
-        "signal" => (chain::own, chain::against),
+        "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };
     Some(Judge { own, against })

@@ -152,6 +152,22 @@ pub fn rbf_against(
     ])
 }
 
+/// `order`, frames below n of which none comes twice.
+pub fn distinct_frames(outputs: &Bundle, n: usize) -> Result<Vec<usize>, ArrayError> {
+    let order = outputs.indices("order")?;
+    let mut seen = vec![false; n];
+    for &i in &order {
+        if i >= n || std::mem::replace(&mut seen[i], true) {
+            return Err(ArrayError {
+                name: "order".into(),
+                expected: format!("distinct frames below {n}"),
+                found: format!("{i} out of range or twice"),
+            });
+        }
+    }
+    Ok(order)
+}
+
 struct Order {
     p: Vec<[f64; 2]>,
     x: Mat<f64>,
@@ -160,19 +176,9 @@ struct Order {
 }
 
 fn order(inputs: &Bundle, outputs: &Bundle) -> Result<Order, ArrayError> {
-    let order = outputs.indices("order")?;
     let p = inputs.points("P")?;
+    let order = distinct_frames(outputs, p.len())?;
     let count = inputs.integer("count")?;
-    let mut seen = vec![false; p.len()];
-    for &i in &order {
-        if i >= p.len() || std::mem::replace(&mut seen[i], true) {
-            return Err(ArrayError {
-                name: "order".into(),
-                expected: format!("distinct frames below {}", p.len()),
-                found: format!("{i} out of range or twice"),
-            });
-        }
-    }
     if order.len() > count || order.len() < 3 {
         return Err(ArrayError {
             name: "order".into(),
@@ -189,14 +195,13 @@ fn order(inputs: &Bundle, outputs: &Bundle) -> Result<Order, ArrayError> {
     })
 }
 
-/// What the least-squares fit with these sites leaves, n x m.
-fn residual(o: &Order, sites: &[usize]) -> Option<Mat<f64>> {
-    let sites: Vec<[f64; 2]> = sites.iter().map(|&i| o.p[i]).collect();
-    let space = space(&o.p, &sites)?;
-    let x = o.x.transpose().to_owned();
+/// What the least-squares fit to `x` (m x n) with sites at these of the n points leaves, n x m.
+pub fn residual(p: &[[f64; 2]], x: &Mat<f64>, sites: &[usize]) -> Option<Mat<f64>> {
+    let sites: Vec<[f64; 2]> = sites.iter().map(|&i| p[i]).collect();
+    let space = space(p, &sites)?;
     let width = space.ncols().min(space.nrows());
     let qr = Qr::new(space);
-    let mut rotated = x;
+    let mut rotated = x.transpose().to_owned();
     qr.apply_transpose(&mut rotated);
     for j in 0..rotated.ncols() {
         for i in 0..width {
@@ -226,7 +231,7 @@ pub fn sites_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Arr
     let data = o.x.squared_norm_l2();
     let (mut error, mut greedy) = (0.0f64, 0.0f64);
     for l in probes(o.order.len()) {
-        let left = residual(&o, &o.order[..l]);
+        let left = residual(&o.p, &o.x, &o.order[..l]);
         let Some(left) = left else {
             error = f64::INFINITY;
             continue;
@@ -295,7 +300,7 @@ pub fn sites_against(
         .min(b.errors.len());
     let mut gap = 0.0;
     if same < a.order.len().min(b.order.len()) && same >= 4 {
-        gap = match residual(&a, &a.order[..same]) {
+        gap = match residual(&a.p, &a.x, &a.order[..same]) {
             Some(left) => {
                 let norms = norms(&left);
                 let (p, q) = (norms[a.order[same]], norms[b.order[same]]);

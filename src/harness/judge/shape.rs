@@ -1,10 +1,11 @@
 //! The shape signal: error (3), orthonormality, coordinates up to sign and to turns among equal singular values.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 
 use super::{Measured, error_gap, greatest, shaped, share, square};
 use crate::arrays::{ArrayError, Bundle};
+use crate::linalg::dense::thin_svd;
 
 /// Neighbouring singular values closer than this share of the first leave their directions free to turn among themselves.
 const EQUAL: f64 = 1e-6;
@@ -44,6 +45,9 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
         .map(|r| (0..n).map(|i| z[(r, i)]).sum::<f64>() / n as f64)
         .collect();
     let identity = Mat::<f64>::identity(m, m);
+    let wanted = inputs.integer("m")?;
+    // Fewer dimensions than asked are right only where the data have no more.
+    let beyond_rank = if m < wanted { error_h(&a) } else { 0.0 };
     Ok(vec![
         ("error_h", error_h(&a)),
         ("mean", share(greatest(&mean, outputs.vector("h0")?), size)),
@@ -61,11 +65,24 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
                 .filter(|&j| points_backwards(a.h.col_as_slice(j)))
                 .count() as f64,
         ),
-        (
-            "too_many_dimensions",
-            m.saturating_sub(inputs.integer("m")?) as f64,
-        ),
+        ("too_many_dimensions", m.saturating_sub(wanted) as f64),
+        ("too_few_dimensions", share(beyond_rank, size * size)),
     ])
+}
+
+/// (3) for m dimensions, and the coordinates X (m' x n) with m' cut to the rank. None where the SVD fails.
+pub fn truncated(z: MatRef<'_, f64>, m: usize) -> Option<(f64, Mat<f64>)> {
+    let (d, n) = z.shape();
+    let mean: Vec<f64> = (0..d)
+        .map(|r| (0..n).map(|i| z[(r, i)]).sum::<f64>() / n as f64)
+        .collect();
+    let centred = Mat::from_fn(d, n, |r, i| z[(r, i)] - mean[r]);
+    let svd = thin_svd(centred.as_ref()).ok()?;
+    let rounding = d.max(n) as f64 * f64::EPSILON * z.norm_l2();
+    let rank = svd.s.iter().take_while(|&&s| s > rounding).count();
+    let kept = m.min(rank);
+    let x = Mat::from_fn(kept, n, |j, i| svd.s[j] * svd.v[(i, j)]);
+    Some((square(&svd.s[kept..]), x))
 }
 
 /// The entry of largest magnitude is negative, and no positive one is as large up to rounding.

@@ -1,7 +1,10 @@
 //! The time signal: parameters, knots, spline and rho, each by its definition.
 
+use faer::Mat;
+
 use super::{Measured, diagonal, error_gap, greatest, shaped, share, square};
 use crate::arrays::{ArrayError, Bundle};
+use crate::linalg::dense::thin_svd;
 
 pub fn parameters_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let p = inputs.points("P")?;
@@ -50,8 +53,14 @@ pub fn knots_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Arr
     ])
 }
 
-/// The greatest distance of an interior knot from the average that reading 2 asks for, by the piecewise linear function t(x), 1-based.
+/// The greatest distance of an interior knot from the average that reading 2 asks for.
 fn averages(t: &[f64], u: &[f64], k: usize, symmetric: bool) -> f64 {
+    let expected = interior(t, k, symmetric);
+    greatest(&u[3..k - 1], &expected)
+}
+
+/// The k - 4 interior knots of reading 2, by the piecewise linear function t(x), 1-based.
+fn interior(t: &[f64], k: usize, symmetric: bool) -> Vec<f64> {
     let n = t.len();
     let along = |x: f64| {
         let i = (x.floor() as usize).clamp(1, n - 1);
@@ -65,9 +74,55 @@ fn averages(t: &[f64], u: &[f64], k: usize, symmetric: bool) -> f64 {
                 (false, false) => j as f64 * n as f64 / (k - 3) as f64,
                 (false, true) => 1.0 + j as f64 * (n - 1) as f64 / (k - 3) as f64,
             };
-            (u[2 + j] - along(x)).abs()
+            along(x)
         })
-        .fold(0.0, f64::max)
+        .collect()
+}
+
+/// A step shorter than this share of the layout's diameter is a held pose.
+const HELD: f64 = 1e-9;
+
+/// The least (7) that k control points and this rule leave at these positions (readings 1, 2, 3 and 8). None where the SVD fails.
+pub fn least_error_f(p: &[[f64; 2]], k: usize, symmetric: bool) -> Option<f64> {
+    let t = frame_parameters(p);
+    let mut distinct = t.clone();
+    distinct.dedup();
+    let (n, k) = (distinct.len(), k.min(distinct.len() + 2));
+    let mut full = vec![distinct[0]; 4];
+    full.extend(interior(&distinct, k, symmetric));
+    full.extend([distinct[n - 1]; 4]);
+    let functions = Mat::from_fn(t.len(), k, |i, j| basis(&full, j, 3, t[i]));
+    let svd = thin_svd(functions.as_ref()).ok()?;
+    let points = Mat::from_fn(p.len(), 2, |i, axis| p[i][axis]);
+    let rank = svd.s.iter().take_while(|&&s| s > 1e-11 * svd.s[0]).count();
+    let range = svd.u.get(.., ..rank);
+    Some((&points - range * (range.transpose() * &points)).squared_norm_l2())
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Centripetal parameters in which held poses repeat; the frames' numbers where nothing moves.
+fn frame_parameters(p: &[[f64; 2]]) -> Vec<f64> {
+    let diameter = p
+        .iter()
+        .flat_map(|&a| p.iter().map(move |&b| distance(a, b)))
+        .fold(0.0, f64::max);
+    let mut t = vec![0.0];
+    let mut held = p[0];
+    for &next in &p[1..] {
+        let step = distance(held, next);
+        let moved = step > HELD * diameter;
+        t.push(t[t.len() - 1] + if moved { step.sqrt() } else { 0.0 });
+        if moved {
+            held = next;
+        }
+    }
+    if t[t.len() - 1] > 0.0 {
+        return t;
+    }
+    (0..p.len()).map(|i| i as f64).collect()
 }
 
 pub fn knots_against(

@@ -1,0 +1,201 @@
+//! Places where nothing can be written.
+
+use std::fs;
+use std::os::unix::fs::FileTypeExt;
+use std::process::Command;
+
+use super::common::{MESHSEQ, Scratch, text};
+use super::{assert_refusal, good, refused};
+
+/// Every verb that writes, to this place: with its other outputs good, which must not be written either.
+#[track_caller]
+fn every_verb(scratch: &Scratch, npz: &str, json: &str, words: &[&str]) {
+    for arguments in verbs(scratch, npz, json) {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        refused(scratch.path(), &arguments, words);
+    }
+}
+
+fn verbs(scratch: &Scratch, npz: &str, json: &str) -> Vec<Vec<String>> {
+    let (good, rep) = (scratch.arg("good.npz"), scratch.arg("rep.npz"));
+    let (fine_npz, fine_json) = (scratch.arg("fine.npz"), scratch.arg("fine.json"));
+    let klm = ["--k", "6", "--l", "5", "--m", "3"];
+    let fit = |npz: &str, json: &str| {
+        let all = [
+            &["signal", "fit", &good, "-o", npz, "--json", json],
+            &klm[..],
+        ]
+        .concat();
+        all.iter().map(|s| s.to_string()).collect()
+    };
+    let verb = |all: &[&str]| all.iter().map(|s| s.to_string()).collect();
+    vec![
+        verb(&["info", &good, "--json", json]),
+        verb(&["convert", &good, npz]),
+        verb(&["signal", "sample", &rep, "-o", npz]),
+        fit(npz, &fine_json),
+        fit(&fine_npz, json),
+        fit(npz, json),
+    ]
+}
+
+#[test]
+fn folders_that_do_not_exist_or_are_files() {
+    let scratch = good();
+    let (npz, json) = (scratch.arg("none/a.npz"), scratch.arg("none/a.json"));
+    every_verb(
+        &scratch,
+        &npz,
+        &json,
+        &["none", "does not exist", "create it"],
+    );
+    let (npz, json) = (
+        scratch.arg("good.npz/a.npz"),
+        scratch.arg("good.npz/a.json"),
+    );
+    every_verb(&scratch, &npz, &json, &["good.npz", "does not exist"]);
+    for path in ["none/frames", "none/a.pc2"] {
+        refused(
+            scratch.path(),
+            &["convert", &scratch.arg("good.npz"), &scratch.arg(path)],
+            &["none", "does not exist"],
+        );
+    }
+    every_verb(&scratch, "", "", &[""]);
+}
+
+#[test]
+fn folders_in_the_place_of_files() {
+    let scratch = good();
+    for name in ["a.npz", "a.json"] {
+        fs::create_dir(scratch.at(name)).unwrap();
+        fs::write(scratch.at(name).join("keep.txt"), "mine").unwrap();
+    }
+    every_verb(
+        &scratch,
+        &scratch.arg("a.npz"),
+        &scratch.arg("a.json"),
+        &["a."],
+    );
+    // A folder of something else is not replaced by one of frames, nor is a file.
+    for taken in ["a.json", "good.npz/"] {
+        refused(
+            scratch.path(),
+            &["convert", &scratch.arg("good.npz"), &scratch.arg(taken)],
+            &[],
+        );
+    }
+}
+
+#[test]
+fn endings_that_are_no_representation() {
+    let scratch = good();
+    let klm = ["--k", "6", "--l", "5", "--m", "3"];
+    for name in ["rep", "rep.json", "frames/"] {
+        let arguments = [
+            "signal",
+            "fit",
+            &scratch.arg("good.npz"),
+            "-o",
+            &scratch.arg(name),
+        ];
+        refused(
+            scratch.path(),
+            &[&arguments[..], &klm].concat(),
+            &["one .npz file"],
+        );
+    }
+    refused(
+        scratch.path(),
+        &["convert", &scratch.arg("good.npz"), &scratch.arg("a.fbx")],
+        &["a.fbx", "not supported"],
+    );
+    refused(
+        scratch.path(),
+        &["convert", &scratch.arg("good.npz"), &scratch.arg("a.obj")],
+        &["a.obj", "one frame"],
+    );
+}
+
+/// The device that is always full is written to, not replaced by a file.
+#[test]
+fn the_full_device() {
+    let scratch = good();
+    let is_device = || fs::metadata("/dev/full").is_ok_and(|m| m.file_type().is_char_device());
+    if !is_device() {
+        println!("skipped: no /dev/full");
+        return;
+    }
+    let (good, npz) = (scratch.arg("good.npz"), scratch.arg("fine.npz"));
+    let words = ["/dev/full", "No space left", "nothing was written"];
+    refused(
+        scratch.path(),
+        &["info", &good, "--json", "/dev/full"],
+        &words,
+    );
+    let fit = [
+        "signal",
+        "fit",
+        &good,
+        "-o",
+        &npz,
+        "--json",
+        "/dev/full",
+        "--tolerance",
+        "0.01",
+    ];
+    refused(scratch.path(), &fit, &words);
+    assert!(is_device());
+    let said = super::common::must(&["info", &good, "--json", "/dev/stdout"]);
+    assert!(said.contains("\"frames\": 6"), "{said}");
+}
+
+/// A file system of 64 kB, full already, that is there for one command only.
+#[test]
+fn a_full_disk() {
+    let scratch = good();
+    let disk = scratch.arg("disk");
+    fs::create_dir(&disk).unwrap();
+    let place = |name: &str| format!("{disk}/{name}");
+    let mut runs = verbs(&scratch, &place("a.npz"), &place("a.json"));
+    for name in ["frames", "a.pc2"] {
+        runs.push(vec!["convert".into(), scratch.arg("good.npz"), place(name)]);
+    }
+    for arguments in runs {
+        let script =
+            "mount -t tmpfs -o size=64k tmpfs \"$1\" 2>/dev/null || exit 77; disk=$1; shift
+            head -c 65536 /dev/zero > \"$disk/filler\" 2>/dev/null
+            \"$0\" \"$@\"; code=$?; ls -A \"$disk\"; exit $code";
+        let mut output = Command::new("unshare")
+            .args([
+                "--mount",
+                "--map-root-user",
+                "sh",
+                "-c",
+                script,
+                MESHSEQ,
+                &disk,
+            ])
+            .args(&arguments)
+            .output()
+            .unwrap();
+        let unshared = !text(&output.stderr).starts_with("unshare");
+        if output.status.code() == Some(77) || !unshared {
+            println!("skipped: cannot mount a small file system");
+            return;
+        }
+        assert_eq!(text(&output.stdout), "filler\n", "{arguments:?}");
+        output.stdout.clear();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        assert_refusal(
+            &output,
+            &arguments,
+            &["disk/", "No space left", "nothing was written"],
+        );
+    }
+    let left: Vec<_> = super::listing(scratch.path()).into_keys().collect();
+    assert_eq!(
+        left,
+        ["disk", "good.npz", "rep.npz"].map(|name| scratch.at(name))
+    );
+}
