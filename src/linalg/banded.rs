@@ -6,62 +6,79 @@ const INVERSE_STEPS: usize = 4;
 
 /// min sum_i (sum_j a_ij c_(first_i + j) - b_i)^2 by Givens rotations, one row at a time; right-hand sides are points of the plane.
 ///
+/// The rotations are free of square roots (Gentleman 1973): R = D^(1/2) U with a unit upper triangle U, and a row carries a weight. As stable as the
+/// usual ones, and consecutive rows overlap in the processor: nothing but the weights waits for a division.
+///
 /// O(rows) when rows come by non-decreasing `first`; any order is right.
 pub struct BandedLeastSquares {
-    upper: Vec<[f64; BAND]>,
-    right: Vec<[f64; 2]>,
-    residual: f64,
+    rows: Vec<Row>,
 }
+
+/// Three entries right of a diagonal, one that is always 0, and two right-hand sides: six numbers that one rotation treats alike.
+type Line = [f64; 6];
+
+/// The square of R's pivot, and the row of U, beyond its diagonal 1, with that of U's right-hand sides.
+#[derive(Clone, Copy)]
+struct Row {
+    line: Line,
+    square: f64,
+}
+
+/// Pivots start here in place of 0, so that nothing is divided by 0: far below the square of any entry that counts.
+const EMPTY: f64 = 1e-300;
 
 impl BandedLeastSquares {
     /// For `columns` unknowns, at least [`BAND`].
     pub fn new(columns: usize) -> Self {
+        let empty = Row {
+            line: [0.0; 6],
+            square: EMPTY,
+        };
         Self {
-            upper: vec![[0.0; BAND]; columns],
-            right: vec![[0.0; 2]; columns],
-            residual: 0.0,
+            rows: vec![empty; columns],
         }
     }
 
     /// Adds the equation sum_j row_j c_(first + j) = b.
-    pub fn add(&mut self, first: usize, mut row: [f64; BAND], mut b: [f64; 2]) {
-        for pivot in first..self.upper.len() {
-            if row == [0.0; BAND] {
+    pub fn add(&mut self, first: usize, row: [f64; BAND], b: [f64; 2]) {
+        let mut head = row[0];
+        let mut line = [row[1], row[2], row[3], 0.0, b[0], b[1]];
+        let mut weight = 1.0;
+        for (done, pivot) in self.rows.iter_mut().skip(first).enumerate() {
+            // Rows that come in order are used up after BAND rotations. Not looking before then leaves the processor nothing to guess.
+            if done >= BAND && head == 0.0 && line[..3] == [0.0; 3] {
                 break;
             }
-            let upper = &mut self.upper[pivot];
-            let length = upper[0].hypot(row[0]);
-            if length > 0.0 {
-                let (cosine, sine) = (upper[0] / length, row[0] / length);
-                for (u, r) in upper.iter_mut().zip(&mut row) {
-                    (*u, *r) = (cosine * *u + sine * *r, cosine * *r - sine * *u);
-                }
-                for (u, r) in self.right[pivot].iter_mut().zip(&mut b) {
-                    (*u, *r) = (cosine * *u + sine * *r, cosine * *r - sine * *u);
-                }
+            let share = weight * head;
+            let square = pivot.square + share * head;
+            let (cosine, sine) = (pivot.square / square, share / square);
+            for j in 0..6 {
+                let (u, x) = (pivot.line[j], line[j]);
+                pivot.line[j] = cosine * u + sine * x;
+                line[j] = x - head * u;
             }
-            row = [row[1], row[2], row[3], 0.0];
+            pivot.square = square;
+            weight *= cosine;
+            head = line[0];
+            line = [line[1], line[2], 0.0, 0.0, line[4], line[5]];
         }
-        self.residual += b[0] * b[0] + b[1] * b[1];
     }
 
     /// The ratio of the smallest to the largest pivot: near 0 where the equations leave freedom.
     pub fn pivot_ratio(&self) -> f64 {
-        let pivots = self.upper.iter().map(|row| row[0].abs());
-        let (low, high) = pivots.fold((f64::INFINITY, 0.0f64), |(low, high), p| {
-            (low.min(p), high.max(p))
-        });
-        if high > 0.0 { low / high } else { 0.0 }
+        let (low, high) = self
+            .rows
+            .iter()
+            .fold((f64::INFINITY, 0.0f64), |(low, high), row| {
+                (low.min(row.square), high.max(row.square))
+            });
+        if high > 0.0 { (low / high).sqrt() } else { 0.0 }
     }
 
     /// An estimate, from above and close, of the least singular value over the largest pivot: inverse iteration with R^T R, O(columns).
     pub fn reciprocal_condition(&self) -> f64 {
-        let columns = self.upper.len();
-        let largest = self
-            .upper
-            .iter()
-            .map(|row| row[0].abs())
-            .fold(0.0, f64::max);
+        let columns = self.rows.len();
+        let largest = self.rows.iter().map(|row| row.square).fold(0.0, f64::max);
         let mut x: Vec<f64> = (0..columns)
             .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
             .collect();
@@ -76,38 +93,43 @@ impl BandedLeastSquares {
                 return 0.0;
             }
         }
-        1.0 / growth.sqrt() / largest
+        1.0 / (growth * largest).sqrt()
     }
 
+    /// x := D^-1 U^-T x.
     fn solve_transposed(&self, x: &mut [f64]) {
-        for i in 0..x.len() {
-            x[i] /= self.upper[i][0];
+        for (i, row) in self.rows.iter().enumerate() {
             let value = x[i];
-            for j in 1..BAND.min(x.len() - i) {
-                x[i + j] -= self.upper[i][j] * value;
+            for (x, u) in x[i + 1..].iter_mut().zip(&row.line[..BAND - 1]) {
+                *x -= u * value;
             }
+            x[i] = value / row.square;
         }
     }
 
+    /// x := U^-1 x.
     fn solve_upper(&self, x: &mut [f64]) {
-        for i in (0..x.len()).rev() {
-            for j in 1..BAND.min(x.len() - i) {
-                x[i] -= self.upper[i][j] * x[i + j];
+        for (i, row) in self.rows.iter().enumerate().rev() {
+            let (before, after) = x.split_at_mut(i + 1);
+            for (u, x) in row.line[..BAND - 1].iter().zip(after) {
+                before[i] -= u * *x;
             }
-            x[i] /= self.upper[i][0];
         }
     }
 
     /// The unknowns, for equations of full rank.
     pub fn solve(&self) -> Vec<[f64; 2]> {
-        let mut c = self.right.clone();
-        for i in (0..c.len()).rev() {
+        let mut c: Vec<[f64; 2]> = self
+            .rows
+            .iter()
+            .map(|row| [row.line[4], row.line[5]])
+            .collect();
+        for (i, row) in self.rows.iter().enumerate().rev() {
             for j in 1..BAND.min(c.len() - i) {
-                let (known, factor) = (c[i + j], self.upper[i][j]);
+                let (known, factor) = (c[i + j], row.line[j - 1]);
                 c[i][0] -= factor * known[0];
                 c[i][1] -= factor * known[1];
             }
-            c[i] = c[i].map(|x| x / self.upper[i][0]);
         }
         c
     }

@@ -3,8 +3,10 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
 use faer::linalg::{evd, householder, qr, svd, triangular_solve};
-use faer::{Accum, Conj, Mat, MatRef, Par, diag::Diag};
+use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, diag::Diag};
 use thiserror::Error;
+
+use super::kernels::clear_upper_halves;
 
 /// Why a dense factorisation failed.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -20,11 +22,10 @@ pub enum FactorError {
     },
 }
 
-/// A B.
-pub fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
-    let mut product = Mat::zeros(a.nrows(), b.ncols());
-    matmul(product.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
-    product
+/// C := A B, or C + A B, on one thread.
+pub fn multiply(c: MatMut<'_, f64>, add: Accum, a: MatRef<'_, f64>, b: MatRef<'_, f64>) {
+    matmul(c, add, a, b, 1.0, Par::Seq);
+    clear_upper_halves();
 }
 
 /// Eigenvalues by decreasing size and their unit eigenvectors as columns.
@@ -125,6 +126,7 @@ impl Qr {
             MemStack::new(&mut MemBuffer::new(scratch)),
             Default::default(),
         );
+        clear_upper_halves();
         Self {
             factors: a,
             coefficients,
@@ -147,6 +149,7 @@ impl Qr {
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
+        clear_upper_halves();
     }
 
     /// Replaces B by Q B, with the full square Q.
@@ -160,6 +163,7 @@ impl Qr {
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
+        clear_upper_halves();
     }
 
     fn scratch(&self, columns: usize) -> faer::dyn_stack::StackReq {
@@ -179,6 +183,7 @@ impl Qr {
             x.as_mut(),
             Par::Seq,
         );
+        clear_upper_halves();
         x
     }
 }

@@ -26,6 +26,17 @@ macro_rules! vectorised {
 }
 pub(crate) use vectorised;
 
+/// Marks the upper halves of the vector registers as unused. faer's AVX-512 matrix product (private-gemm-x86 0.1.22) returns without doing so, and every
+/// instruction of the baseline set is then several times slower, until something else does: call this after faer.
+#[inline]
+pub fn clear_upper_halves() {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the processor has just been seen to have AVX; no value is kept in the upper halves across a call.
+        unsafe { std::arch::x86_64::_mm256_zeroupper() };
+    }
+}
+
 /// The number of lanes of a sum.
 pub const LANES: usize = 8;
 
@@ -55,19 +66,43 @@ vectorised! {
 }
 
 vectorised! {
-    /// y += a x.
-    pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-        for (y, x) in y.iter_mut().zip(x) {
+    /// The inner products of four vectors with one, reading that one once.
+    pub fn dot4(a: [&[f64]; 4], b: &[f64]) -> [f64; 4] {
+        let n = b.len();
+        let a = a.map(|a| &a[..n]);
+        let mut lanes = [[0.0; LANES]; 4];
+        let whole = n / LANES * LANES;
+        for first in (0..whole).step_by(LANES) {
+            for (lanes, a) in lanes.iter_mut().zip(a) {
+                for lane in 0..LANES {
+                    lanes[lane] += a[first + lane] * b[first + lane];
+                }
+            }
+        }
+        for i in whole..n {
+            for (lanes, a) in lanes.iter_mut().zip(a) {
+                lanes[i - whole] += a[i] * b[i];
+            }
+        }
+        lanes.map(total)
+    }
+}
+
+vectorised! {
+    /// y += a x; the sum of squares of what y becomes is added to `squares`, entry by entry.
+    pub fn axpy_squares(a: f64, x: &[f64], y: &mut [f64], squares: &mut [f64]) {
+        for ((y, x), square) in y.iter_mut().zip(x).zip(squares) {
             *y += a * x;
+            *square += *y * *y;
         }
     }
 }
 
 vectorised! {
-    /// y_i += x_i^2.
-    pub fn add_squares(x: &[f64], y: &mut [f64]) {
+    /// y += a x.
+    pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
         for (y, x) in y.iter_mut().zip(x) {
-            *y += x * x;
+            *y += a * x;
         }
     }
 }
@@ -83,6 +118,21 @@ vectorised! {
     }
 }
 
+/// The inner products of the columns `x(j)`, j < count, of a matrix with y.
+pub fn project<'a>(
+    count: usize,
+    x: impl Fn(usize) -> &'a [f64],
+    y: &[f64],
+    products: &mut Vec<f64>,
+) {
+    let whole = count / 4 * 4;
+    products.clear();
+    for j in (0..whole).step_by(4) {
+        products.extend(dot4([x(j), x(j + 1), x(j + 2), x(j + 3)], y));
+    }
+    products.extend((whole..count).map(|j| dot(x(j), y)));
+}
+
 /// y += sum_j a_j x_j over the columns `x(j)` of a matrix.
 pub fn combine<'a>(a: &[f64], x: impl Fn(usize) -> &'a [f64], y: &mut [f64]) {
     let whole = a.len() / 4 * 4;
@@ -95,6 +145,46 @@ pub fn combine<'a>(a: &[f64], x: impl Fn(usize) -> &'a [f64], y: &mut [f64]) {
     }
     for (j, &a) in a.iter().enumerate().skip(whole) {
         axpy(a, x(j), y);
+    }
+}
+
+vectorised! {
+    /// The sum of all entries.
+    pub fn sum(a: &[f64]) -> f64 {
+        let mut lanes = [0.0; LANES];
+        let (chunks, rest) = a.as_chunks::<LANES>();
+        for x in chunks {
+            for lane in 0..LANES {
+                lanes[lane] += x[lane];
+            }
+        }
+        for (lane, x) in lanes.iter_mut().zip(rest) {
+            *lane += x;
+        }
+        total(lanes)
+    }
+}
+
+vectorised! {
+    /// z = x - y.
+    pub fn subtract(x: &[f64], y: &[f64], z: &mut [f64]) {
+        for ((z, x), y) in z.iter_mut().zip(x).zip(y) {
+            *z = x - y;
+        }
+    }
+}
+
+vectorised! {
+    /// The greatest magnitude.
+    pub fn max_abs(a: &[f64]) -> f64 {
+        let mut lanes = [0.0f64; LANES];
+        let (chunks, rest) = a.as_chunks::<LANES>();
+        for x in chunks {
+            for lane in 0..LANES {
+                lanes[lane] = if x[lane].abs() > lanes[lane] { x[lane].abs() } else { lanes[lane] };
+            }
+        }
+        lanes.iter().chain(rest).fold(0.0, |most, x| x.abs().max(most))
     }
 }
 

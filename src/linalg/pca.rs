@@ -1,14 +1,15 @@
 //! Principal components of many numbers in few samples: the route that costs one product of the data with itself.
 
-use faer::linalg::matmul::{matmul, triangular};
+use faer::linalg::matmul::triangular;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-use super::dense::{FactorError, Qr, symmetric_eigen, thin_svd};
+use super::dense::{FactorError, Qr, multiply, symmetric_eigen, thin_svd};
+use super::kernels::{axpy, clear_upper_halves, max_abs, norm_squared, subtract};
 
 /// Rows of the data handled at a time; n columns of this many numbers stay in cache.
-const BLOCK: usize = 256;
+const BLOCK: usize = 1024;
 /// Partial Gram matrices, added up in a fixed order: the result does not depend on the number of threads.
 const PARTS: usize = 8;
 /// Squared ratio of the last kept singular value to the first, below which the Householder route is taken: squaring the data costs the basis
@@ -40,19 +41,19 @@ pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     if m == 0 {
         return Ok(empty(mean, d, n));
     }
-    let negligible = n.max(d) as f64 * f64::EPSILON * frobenius(samples);
     if n < d
-        && let Some(pca) = by_gram(samples, &mean, m, negligible)?
+        && let Some(pca) = by_gram(samples, &mean, m)?
     {
         return Ok(pca);
     }
-    by_qr(samples, mean, m, negligible)
+    by_qr(samples, mean, m)
 }
 
-fn frobenius(samples: MatRef<'_, f64>) -> f64 {
-    let square = |j| samples.col(j).iter().map(|x| x * x).sum::<f64>();
-    let squares: Vec<f64> = (0..samples.ncols()).into_par_iter().map(square).collect();
-    squares.iter().sum::<f64>().sqrt()
+/// What a singular value must exceed to count, from the squares of all of them: ||samples||_F^2 is their sum and n |mean|^2.
+fn negligible(samples: MatRef<'_, f64>, mean: &[f64], squares: impl Iterator<Item = f64>) -> f64 {
+    let (d, n) = samples.shape();
+    let frobenius = (squares.sum::<f64>() + n as f64 * norm_squared(mean)).sqrt();
+    n.max(d) as f64 * f64::EPSILON * frobenius
 }
 
 fn empty(mean: Vec<f64>, d: usize, n: usize) -> Pca {
@@ -70,10 +71,14 @@ fn mean(samples: MatRef<'_, f64>) -> Vec<f64> {
     mean.par_chunks_mut(BLOCK)
         .enumerate()
         .for_each(|(b, mean)| {
-            for j in 0..n {
-                let column = samples.get(b * BLOCK..b * BLOCK + mean.len(), j);
-                for (sum, x) in mean.iter_mut().zip(column.iter()) {
-                    *sum += x;
+            let rows = samples.subrows(b * BLOCK, mean.len());
+            for sample in rows.col_iter() {
+                match sample.try_as_col_major() {
+                    Some(sample) => axpy(1.0, sample.as_slice(), mean),
+                    None => mean
+                        .iter_mut()
+                        .zip(sample.iter())
+                        .for_each(|(sum, x)| *sum += x),
                 }
             }
             mean.iter_mut().for_each(|x| *x /= n as f64);
@@ -82,14 +87,22 @@ fn mean(samples: MatRef<'_, f64>) -> Vec<f64> {
 }
 
 /// Writes rows `first..` of the centred samples into `block`, one sample a column.
-fn centred_rows(samples: MatRef<'_, f64>, mean: &[f64], first: usize, mut block: MatMut<'_, f64>) {
+fn centred_rows(samples: MatRef<'_, f64>, mean: &[f64], first: usize, block: MatMut<'_, f64>) {
     let rows = block.nrows();
     let mean = &mean[first..first + rows];
-    for j in 0..samples.ncols() {
-        let source = samples.get(first..first + rows, j);
-        let target = block.rb_mut().col_mut(j);
-        for ((y, x), mean) in target.iter_mut().zip(source.iter()).zip(mean) {
-            *y = x - mean;
+    let sources = samples.subrows(first, rows).col_iter();
+    for (source, mut target) in sources.zip(block.col_iter_mut()) {
+        match (
+            source.try_as_col_major(),
+            target.rb_mut().try_as_col_major_mut(),
+        ) {
+            (Some(source), Some(target)) => {
+                subtract(source.as_slice(), mean, target.as_slice_mut())
+            }
+            _ => {
+                let numbers = target.iter_mut().zip(source.iter()).zip(mean);
+                numbers.for_each(|((y, x), mean)| *y = x - mean);
+            }
         }
     }
 }
@@ -118,6 +131,7 @@ fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
                     1.0,
                     Par::Seq,
                 );
+                clear_upper_halves();
             }
             sum
         })
@@ -129,14 +143,10 @@ fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
 }
 
 /// The Gram route, or None where the kept singular values spread too far for it.
-fn by_gram(
-    samples: MatRef<'_, f64>,
-    mean: &[f64],
-    m: usize,
-    negligible: f64,
-) -> Result<Option<Pca>, FactorError> {
+fn by_gram(samples: MatRef<'_, f64>, mean: &[f64], m: usize) -> Result<Option<Pca>, FactorError> {
     let n = samples.ncols();
     let eigen = symmetric_eigen(gram(samples, mean).as_ref())?;
+    let negligible = negligible(samples, mean, eigen.values.iter().copied());
     let least = (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible);
     if eigen.values[m - 1] <= least {
         return Ok(None);
@@ -167,19 +177,14 @@ fn centred_product(samples: MatRef<'_, f64>, mean: &[f64], w: MatRef<'_, f64>) -
             |buffer, (block, target)| {
                 let mut rows = buffer.get_mut(..target.nrows(), ..);
                 centred_rows(samples, mean, block * BLOCK, rows.rb_mut());
-                matmul(target, Accum::Replace, rows.rb(), w, 1.0, Par::Seq);
+                multiply(target, Accum::Replace, rows.rb(), w);
             },
         );
     product
 }
 
 /// The Householder route: Y = Q R and R = U S V^T give Y = (Q U) S V^T.
-fn by_qr(
-    samples: MatRef<'_, f64>,
-    mean: Vec<f64>,
-    m: usize,
-    negligible: f64,
-) -> Result<Pca, FactorError> {
+fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, FactorError> {
     let (d, n) = samples.shape();
     let mut centred = Mat::zeros(d, n);
     centred_rows(samples, &mean, 0, centred.as_mut());
@@ -195,6 +200,7 @@ fn by_qr(
         let svd = thin_svd(centred.as_ref())?;
         (svd.u, svd.v, svd.s)
     };
+    let negligible = negligible(samples, &mean, s.iter().map(|s| s * s));
     let m = m.min(s.iter().take_while(|&&s| s > negligible).count());
     let mut basis = u.get(.., ..m).to_owned();
     let signs = orient(&mut basis);
@@ -211,11 +217,9 @@ fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
     (0..basis.ncols())
         .map(|j| {
             let column = basis.col_as_slice_mut(j);
-            let largest = column.iter().fold(
-                0.0f64,
-                |best, &x| if x.abs() > best.abs() { x } else { best },
-            );
-            if largest < 0.0 {
+            let most = max_abs(column);
+            let largest = column.iter().find(|x| x.abs() == most);
+            if largest.is_some_and(|&x| x < 0.0) {
                 column.iter_mut().for_each(|x| *x = -*x);
                 -1.0
             } else {
@@ -241,8 +245,8 @@ mod tests {
         let whole = pca(samples.as_ref(), 8).unwrap();
         assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
         let mean = mean(samples.as_ref());
-        let gram = by_gram(samples.as_ref(), &mean, 4, 0.0).unwrap().unwrap();
-        let qr = by_qr(samples.as_ref(), mean, 4, 0.0).unwrap();
+        let gram = by_gram(samples.as_ref(), &mean, 4).unwrap().unwrap();
+        let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
         assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);
         assert!((&gram.coordinates - &qr.coordinates).norm_max() < 1e-12 * samples.norm_l2());
     }

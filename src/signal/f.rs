@@ -4,7 +4,6 @@ use faer::Mat;
 use thiserror::Error;
 
 use super::Point;
-use super::parameters::distinct;
 use crate::linalg::banded::{BAND, BandedLeastSquares};
 use crate::linalg::dense::{FactorError, thin_svd};
 
@@ -58,16 +57,16 @@ pub enum SplineError {
     Factor(#[from] FactorError),
 }
 
-/// The knots with one more copy of each end, and what a cubic basis needs of them.
-struct Basis {
-    knots: Vec<f64>,
+/// What a cubic basis needs of the knots. Indices here count one more copy of each end, as is usual; no formula touches those copies.
+struct Basis<'a> {
+    knots: &'a [f64],
 }
 
 /// Four neighbouring basis functions (or derivatives) and the index of the first.
 type Local = (usize, [f64; BAND]);
 
-impl Basis {
-    fn new(knots: &[f64]) -> Result<Self, SplineError> {
+impl<'a> Basis<'a> {
+    fn new(knots: &'a [f64]) -> Result<Self, SplineError> {
         let found = knots.len();
         let bad = |at| SplineError::BadKnots { found, at };
         if found < 6 {
@@ -79,62 +78,88 @@ impl Basis {
         if knots[2] >= knots[found - 3] || !knots[0].is_finite() || !knots[found - 1].is_finite() {
             return Err(bad(2));
         }
-        let ends = [knots[0], knots[found - 1]];
-        let mut all = vec![ends[0]];
-        all.extend_from_slice(knots);
-        all.push(ends[1]);
-        Ok(Self { knots: all })
+        Ok(Self { knots })
     }
 
     fn count(&self) -> usize {
-        self.knots.len() - 4
+        self.knots.len() - 2
     }
 
     fn domain(&self) -> (f64, f64) {
-        (self.knots[3], self.knots[self.count()])
+        (self.knots[2], self.knots[self.count() - 1])
     }
 
-    /// The non-empty span that holds u, as the index of its left knot; u is clamped to the domain.
+    /// Knot i, 1 <= i <= k + 2.
+    fn knot(&self, i: usize) -> f64 {
+        self.knots[i - 1]
+    }
+
+    /// The non-empty span that holds u, as the index of its left knot; u is clamped to the domain. O(log k).
     fn span(&self, u: f64) -> usize {
-        let k = self.count();
+        let inner = &self.knots[2..self.count()];
         let (low, high) = self.domain();
         if u >= high {
-            return self.knots[3..k].partition_point(|&x| x < high) + 2;
+            return inner.partition_point(|&x| x < high) + 2;
         }
-        self.knots[3..=k].partition_point(|&x| x <= u.max(low)) + 2
+        inner.partition_point(|&x| x <= u.max(low)) + 2
     }
 
-    /// Values at u of the four functions that do not vanish on its span (Cox & de Boor).
+    /// The same, looked for from the span before it.
+    fn span_from(&self, before: usize, u: f64) -> usize {
+        let mut s = before;
+        while s < self.count() - 1 && u >= self.knot(s + 1) {
+            s += 1;
+        }
+        if self.knot(s) <= u && u < self.knot(s + 1) {
+            s
+        } else {
+            self.span(u)
+        }
+    }
+
+    /// Values at u of the four functions that do not vanish on its span.
     fn values(&self, u: f64) -> Local {
+        self.values_on(self.span(u), u)
+    }
+
+    /// Values at u of the four functions that do not vanish on the span s (Cox & de Boor).
+    fn values_on(&self, s: usize, u: f64) -> Local {
         let (low, high) = self.domain();
         let u = u.clamp(low, high);
-        let s = self.span(u);
-        let mut b = [1.0, 0.0, 0.0, 0.0];
-        for degree in 1..BAND {
-            let mut saved = 0.0;
-            for r in 0..degree {
-                let (right, left) = (self.knots[s + r + 1], self.knots[s + 1 + r - degree]);
-                let share = b[r] / (right - left);
-                b[r] = saved + (right - u) * share;
-                saved = (u - left) * share;
-            }
-            b[degree] = saved;
-        }
-        (s - 3, b)
+        let [t0, t1, t2, t3, t4, t5]: [f64; 6] = std::array::from_fn(|i| self.knots[s - 3 + i]);
+        let share = 1.0 / (t3 - t2);
+        let shares = [(t3 - u) * share / (t3 - t1), (u - t2) * share / (t4 - t2)];
+        let square = [
+            (t3 - u) * shares[0],
+            (u - t1) * shares[0] + (t4 - u) * shares[1],
+            (u - t2) * shares[1],
+        ];
+        let shares = [
+            square[0] / (t3 - t0),
+            square[1] / (t4 - t1),
+            square[2] / (t5 - t2),
+        ];
+        let cubic = [
+            (t3 - u) * shares[0],
+            (u - t0) * shares[0] + (t4 - u) * shares[1],
+            (u - t1) * shares[1] + (t5 - u) * shares[2],
+            (u - t2) * shares[2],
+        ];
+        (s - 3, cubic)
     }
 
     /// Second derivatives, at u, of the four functions of the span s: linear B-splines of second differences of the coefficients.
     fn second_derivatives(&self, s: usize, u: f64) -> Local {
-        let t = &self.knots;
-        let hat = [(t[s + 1] - u), (u - t[s])].map(|x| x / (t[s + 1] - t[s]));
+        let t = |i| self.knot(i);
+        let hat = [(t(s + 1) - u), (u - t(s))].map(|x| x / (t(s + 1) - t(s)));
         let mut row = [0.0; BAND];
         for (q, weight) in hat.iter().enumerate() {
             // Coefficient q of the second derivative on this span takes coefficients s-3+q .. s-1+q.
             let i = s - 1 + q;
             let wide = [
-                6.0 / (t[i + 2] - t[i]),
-                1.0 / (t[i + 2] - t[i - 1]),
-                1.0 / (t[i + 3] - t[i]),
+                6.0 / (t(i + 2) - t(i)),
+                1.0 / (t(i + 2) - t(i - 1)),
+                1.0 / (t(i + 3) - t(i)),
             ];
             row[q] += weight * wide[0] * wide[1];
             row[q + 1] -= weight * wide[0] * (wide[1] + wide[2]);
@@ -145,13 +170,13 @@ impl Basis {
 
     /// Rows whose squares sum to the integral of |f''|^2 over the domain: f'' is linear on each span.
     fn energy_rows(&self) -> Vec<Local> {
-        let t = &self.knots;
-        let spans = (3..self.count()).filter(|&s| t[s] < t[s + 1]);
+        let t = |i| self.knot(i);
+        let spans = (3..self.count()).filter(|&s| t(s) < t(s + 1));
         spans
             .flat_map(|s| {
-                let h = t[s + 1] - t[s];
-                let (first, a) = self.second_derivatives(s, t[s]);
-                let (_, b) = self.second_derivatives(s, t[s + 1]);
+                let h = t(s + 1) - t(s);
+                let (first, a) = self.second_derivatives(s, t(s));
+                let (_, b) = self.second_derivatives(s, t(s + 1));
                 let combine = |f: f64, sign: f64| std::array::from_fn(|j| f * (a[j] + sign * b[j]));
                 [
                     (first, combine(h.sqrt() / 2.0, 1.0)),
@@ -176,8 +201,13 @@ impl Spline {
     pub fn fit(parameters: &[f64], points: &[Point], knots: &[f64]) -> Result<Self, SplineError> {
         let basis = Basis::new(knots)?;
         check_parameters(parameters, points, &basis)?;
-        let rows: Vec<Local> = parameters.iter().map(|&t| basis.values(t)).collect();
-        let freedom = basis.count().saturating_sub(distinct(parameters).len());
+        let mut span = 3;
+        let row = |&t: &f64| {
+            span = basis.span_from(span, t);
+            basis.values_on(span, t)
+        };
+        let rows: Vec<Local> = parameters.iter().map(row).collect();
+        let freedom = basis.count().saturating_sub(count_distinct(parameters));
         let control = match banded(&basis, &rows, points, freedom) {
             Some(control) => control,
             None => dense(&basis, &rows, points, freedom)?,
@@ -197,22 +227,27 @@ impl Spline {
         Basis::new(&self.knots).map(|_| ())
     }
 
-    /// f~(u); beyond the domain the end points hold. O(log k).
+    /// f~(u); beyond the domain the end points hold. Without control points for its knots, or without a domain, the spline is its first control
+    /// point. O(log k).
     pub fn evaluate(&self, u: f64) -> Point {
-        match Basis::new(&self.knots) {
-            Ok(basis) => apply(&basis.values(u), &self.control),
-            Err(_) => self.control.first().copied().unwrap_or([0.0; 2]),
+        let k = self.control.len();
+        if k < BAND || self.knots.len() != k + 2 || self.knots[2] >= self.knots[k - 1] {
+            return self.control.first().copied().unwrap_or([0.0; 2]);
         }
+        let basis = Basis { knots: &self.knots };
+        apply(&basis.values(u), &self.control)
     }
 
     /// f~ at many parameters.
     pub fn evaluate_all(&self, parameters: &[f64]) -> Vec<Point> {
-        let Ok(basis) = Basis::new(&self.knots) else {
-            return parameters.iter().map(|&u| self.evaluate(u)).collect();
-        };
-        let at = |&u: &f64| apply(&basis.values(u), &self.control);
-        parameters.iter().map(at).collect()
+        parameters.iter().map(|&u| self.evaluate(u)).collect()
     }
+}
+
+/// The number of distinct values of non-decreasing parameters.
+fn count_distinct(parameters: &[f64]) -> usize {
+    let steps = parameters.windows(2).filter(|pair| pair[0] != pair[1]);
+    steps.count() + parameters.len().min(1)
 }
 
 fn check_parameters(

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::Point;
-use super::thin_plate::{Frame, between};
+use super::thin_plate::{Frame, kernels};
 use crate::linalg::dense::Qr;
 use crate::linalg::kernels::{axpy, combine};
 
@@ -60,13 +60,16 @@ impl PoseSignal {
         let columns = |q: Point| [1.0, q[0], q[1]];
         let side = Qr::new(Mat::from_fn(l, affine, |j, a| columns(normalised[j])[a]));
         let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
-        let mut kernels = Mat::from_fn(l, points.len(), |j, i| between(normalised[j], queries[i]));
-        side.apply_transpose(&mut kernels);
+        let mut bends = Mat::zeros(l, points.len());
+        for (i, &q) in queries.iter().enumerate() {
+            kernels(q, &normalised, bends.col_as_slice_mut(i));
+        }
+        side.apply_transpose(&mut bends);
         let system = Mat::from_fn(points.len(), l, |i, j| {
             if j < affine {
                 columns(queries[i])[j]
             } else {
-                kernels[(j, i)]
+                bends[(j, i)]
             }
         });
         let mut right = coordinates.transpose().to_owned();
@@ -93,8 +96,9 @@ impl PoseSignal {
     pub fn evaluate_into(&self, p: Point, x: &mut [f64]) {
         let l = self.sites.len();
         x.copy_from_slice(self.coefficients.col_as_slice(0));
-        let kernels: Vec<f64> = self.sites.iter().map(|&s| between(s, p)).collect();
-        combine(&kernels, |j| self.coefficients.col_as_slice(j + 1), x);
+        let mut bends = vec![0.0; l];
+        kernels(p, &self.sites, &mut bends);
+        combine(&bends, |j| self.coefficients.col_as_slice(j + 1), x);
         axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
         axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
     }

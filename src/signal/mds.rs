@@ -4,24 +4,30 @@
 //! start, then a Newton method to a vanishing gradient, which makes the answer reproducible. Nothing of size n x n is formed in a step;
 //! the dissimilarities themselves are kept.
 
+use std::ops::Range;
+
 use faer::MatRef;
 use rayon::prelude::*;
 
 use super::Point;
-use crate::linalg::kernels::{LANES, total, vectorised};
-
 use super::pins::Pin;
+use crate::linalg::kernels::{LANES, axpy, dot, norm_squared, sum, total, vectorised};
 
-/// Majorisation ends when a step lowers the stress by less than this share of it.
-const MAJORISED: f64 = 1e-7;
+/// Majorisation ends when a step lowers the stress by less than this share of it. On 291 layouts of real sequences, whole and in parts, at m = 3, 7 and
+/// 42, every value from 1e-3 to 1e-7 led to the minimum that majorisation alone reaches.
+const MAJORISED: f64 = 3e-4;
 const MAJORISATION_STEPS: usize = 3000;
+/// The first Newton step is at most this many times as long as the next majorising one, which keeps it in the basin.
+const FIRST_RADIUS: f64 = 3.0;
 /// The gradient has vanished when its norm is below this share of the norm of the attraction n P.
 const VANISHED: f64 = 1e-13;
 const NEWTON_STEPS: usize = 200;
 /// Curvature below this share of n, the typical one, is rounding.
 const FLAT: f64 = 1e-11;
-/// Rows a parallel task handles; below this many points one thread is faster.
-const ROWS_PER_TASK: usize = 64;
+/// Pairs that one thread sees through before another could begin to help.
+const PAIRS_ALONE: usize = 60_000;
+/// Sums over more pairs are made in this many parts, added up in a fixed order: the bits do not depend on the number of threads.
+const PARTS: usize = 8;
 
 /// The dissimilarities delta_ij = ||x_i - x_j||, n x n, kept whole so that rows are contiguous.
 #[derive(Clone, Debug)]
@@ -38,6 +44,7 @@ impl Dissimilarities {
         let mut values = vec![0.0; n * n];
         values
             .par_chunks_mut(n.max(1))
+            .with_min_len(PAIRS_ALONE / 8 / n.max(1) + 1)
             .enumerate()
             .for_each(|(i, row)| {
                 for (j, delta) in row.iter_mut().enumerate() {
@@ -78,78 +85,46 @@ vectorised! {
 }
 
 vectorised! {
-    /// [pull x, pull y, stress] of point `at`: sum_j (delta_ij / d_ij) (p_i - p_j) and sum_j (d_ij - delta_ij)^2. Coincident points exert no pull.
-    pub fn row_pull(at: Point, x: &[f64], y: &[f64], delta: &[f64]) -> [f64; 3] {
-        let mut sums = [[0.0; LANES]; 3];
-        let mut add = |lane: usize, x: f64, y: f64, delta: f64| {
-            let (dx, dy) = (at[0] - x, at[1] - y);
-            let d = (dx * dx + dy * dy).sqrt();
-            let ratio = if d > 0.0 { delta / d } else { 0.0 };
-            sums[0][lane] += ratio * dx;
-            sums[1][lane] += ratio * dy;
-            sums[2][lane] += (d - delta) * (d - delta);
-        };
-        let (x_chunks, x_rest) = x.as_chunks::<LANES>();
-        let (y_chunks, y_rest) = y.as_chunks::<LANES>();
-        let (delta_chunks, delta_rest) = delta.as_chunks::<LANES>();
-        for ((x, y), delta) in x_chunks.iter().zip(y_chunks).zip(delta_chunks) {
-            for lane in 0..LANES {
-                add(lane, x[lane], y[lane], delta[lane]);
-            }
+    /// Terms of the pairs of the point `at` and each of the others: (delta_j / d_j) (p - p_j) and (d_j - delta_j)^2. Coincident points exert no pull.
+    pub fn pulls(at: Point, x: &[f64], y: &[f64], delta: &[f64], pull_x: &mut [f64], pull_y: &mut [f64], stress: &mut [f64]) {
+        let n = delta.len();
+        let (x, y, pull_x, pull_y, stress) = (&x[..n], &y[..n], &mut pull_x[..n], &mut pull_y[..n], &mut stress[..n]);
+        for j in 0..n {
+            let (ex, ey) = (at[0] - x[j], at[1] - y[j]);
+            let d = (ex * ex + ey * ey).sqrt();
+            let ratio = if d > 0.0 { delta[j] / d } else { 0.0 };
+            pull_x[j] = ratio * ex;
+            pull_y[j] = ratio * ey;
+            stress[j] = (d - delta[j]) * (d - delta[j]);
         }
-        for (lane, ((&x, &y), &delta)) in x_rest.iter().zip(y_rest).zip(delta_rest).enumerate() {
-            add(lane, x, y, delta);
-        }
-        sums.map(total)
     }
 }
 
 vectorised! {
-    /// Row `at` of the Hessian of half the stress, times the displacement (u, v): sum_j K_ij (w_i - w_j) with
-    /// K = (1 - delta/d) I + (delta/d^3) e e^T, e = p_i - p_j; K = I where delta is 0.
-    pub fn row_hessian(at: Point, w: Point, plane: [&[f64]; 2], moved: [&[f64]; 2], delta: &[f64]) -> Point {
+    /// Terms of the pairs of the point (x, y) = `at[..2]`, displaced by w = `at[2..]`, and each of the others in the Hessian of half the stress times the
+    /// displacements: K_j (w - w_j) with K = (1 - delta/d) I + (delta/d^3) e e^T, e = p - p_j; K = I where the points coincide.
+    pub fn gains(at: [f64; 4], x: &[f64], y: &[f64], u: &[f64], v: &[f64], delta: &[f64], gain: [&mut [f64]; 2]) {
         let n = delta.len();
-        let [x, y] = plane.map(|a| &a[..n]);
-        let [u, v] = moved.map(|a| &a[..n]);
-        let mut sums = [[0.0; LANES]; 2];
-        let mut add = |lane: usize, j: usize| {
-            let (dx, dy) = (at[0] - x[j], at[1] - y[j]);
-            let (du, dv) = (w[0] - u[j], w[1] - v[j]);
-            let q = dx * dx + dy * dy;
-            let ratio = if q > 0.0 { delta[j] / q.sqrt() } else { 0.0 };
-            let along = if q > 0.0 { ratio * (dx * du + dy * dv) / q } else { 0.0 };
-            sums[0][lane] += (1.0 - ratio) * du + along * dx;
-            sums[1][lane] += (1.0 - ratio) * dv + along * dy;
-        };
-        let whole = n / LANES * LANES;
-        for first in (0..whole).step_by(LANES) {
-            for lane in 0..LANES {
-                add(lane, first + lane);
-            }
+        let (x, y, u, v) = (&x[..n], &y[..n], &u[..n], &v[..n]);
+        let [gain_x, gain_y] = gain.map(|a| &mut a[..n]);
+        for j in 0..n {
+            let (ex, ey, du, dv) = (at[0] - x[j], at[1] - y[j], at[2] - u[j], at[3] - v[j]);
+            let q = ex * ex + ey * ey;
+            let inverse = if q >= f64::MIN_POSITIVE { 1.0 / q } else { 0.0 };
+            let ratio = delta[j] * inverse.sqrt();
+            let along = ratio * inverse * (ex * du + ey * dv);
+            gain_x[j] = (1.0 - ratio) * du + along * ex;
+            gain_y[j] = (1.0 - ratio) * dv + along * ey;
         }
-        for j in whole..n {
-            add(j - whole, j);
-        }
-        sums.map(total)
     }
-}
-
-/// Runs `row` for each of the first `count` points, in parallel where it pays; the bits do not depend on the number of threads.
-fn for_rows<T: Send>(count: usize, row: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-    if count < 2 * ROWS_PER_TASK {
-        return (0..count).map(row).collect();
-    }
-    (0..count)
-        .into_par_iter()
-        .with_min_len(ROWS_PER_TASK)
-        .map(row)
-        .collect()
 }
 
 /// The scaling problem, free points first.
 struct Problem {
     delta: Dissimilarities,
     free: usize,
+    /// Free points in ranges of about as many pairs each.
+    parts: Vec<Range<usize>>,
 }
 
 /// Positions, one array a coordinate, for rows of vector arithmetic; free points first.
@@ -159,14 +134,60 @@ struct Layout {
     y: Vec<f64>,
 }
 
-/// What one pass over the pairs gives at a layout.
+/// What one pass over the pairs gives at a layout. Vectors over the free points hold all x before all y.
 struct Slope {
     /// sum_j (delta_ij / d_ij) (p_i - p_j) of each free point.
-    pull: Vec<Point>,
+    pull: Vec<f64>,
     /// Half the gradient of the stress at each free point.
-    gradient: Vec<Point>,
+    gradient: Vec<f64>,
     /// The stress (6) of the pairs that involve a free point.
     stress: f64,
+}
+
+/// Antisymmetric vectors of pairs summed at both their points, and a number of each pair.
+struct Sums {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    number: f64,
+}
+
+/// The terms of the pairs of one point and a row of others: vectors and, where wanted, numbers.
+struct Terms {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    number: Vec<f64>,
+}
+
+impl Sums {
+    fn zero(n: usize) -> Self {
+        Self {
+            x: vec![0.0; n],
+            y: vec![0.0; n],
+            number: 0.0,
+        }
+    }
+
+    fn add(mut self, other: Self) -> Self {
+        axpy(1.0, &other.x, &mut self.x);
+        axpy(1.0, &other.y, &mut self.y);
+        self.number += other.number;
+        self
+    }
+
+    /// Adds the terms of point i and `others`.
+    fn add_terms(&mut self, i: usize, others: Range<usize>, terms: &Terms) {
+        let count = others.len();
+        for (sums, terms) in [(&mut self.x, &terms.x), (&mut self.y, &terms.y)] {
+            axpy(-1.0, &terms[..count], &mut sums[others.clone()]);
+            sums[i] += sum(&terms[..count]);
+        }
+        self.number += sum(&terms.number[..count.min(terms.number.len())]);
+    }
+
+    /// The vectors of the first points, all x before all y.
+    fn first(&self, count: usize) -> Vec<f64> {
+        [&self.x[..count], &self.y[..count]].concat()
+    }
 }
 
 impl Layout {
@@ -178,17 +199,75 @@ impl Layout {
         [self.x[i], self.y[i]]
     }
 
-    fn moved(&self, step: &[Point]) -> Self {
+    fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
-        for (i, s) in step.iter().enumerate() {
-            moved.x[i] += s[0];
-            moved.y[i] += s[1];
-        }
+        let (x, y) = step.split_at(step.len() / 2);
+        axpy(1.0, x, &mut moved.x[..x.len()]);
+        axpy(1.0, y, &mut moved.y[..y.len()]);
         moved
     }
 }
 
 impl Problem {
+    fn new(delta: Dissimilarities, free: usize) -> Self {
+        let fixed = delta.n - free;
+        let pairs = |rows: usize| rows * rows / 2 + rows * fixed;
+        let parts = if pairs(free) < PAIRS_ALONE { 1 } else { PARTS };
+        let end = |part: usize| {
+            (0..free)
+                .find(|&rows| pairs(rows) >= part * pairs(free) / parts)
+                .unwrap_or(free)
+        };
+        Self {
+            parts: (0..parts)
+                .map(|part| {
+                    end(part)..if part + 1 == parts {
+                        free
+                    } else {
+                        end(part + 1)
+                    }
+                })
+                .collect(),
+            delta,
+            free,
+        }
+    }
+
+    /// Sums the terms of every pair of two free points, and of a free and a fixed one, once each; `row(i, others, terms)` writes those of point i.
+    fn over_pairs(
+        &self,
+        numbers: bool,
+        row: impl Fn(usize, Range<usize>, &mut Terms) + Sync + Send,
+    ) -> Sums {
+        let n = self.delta.n;
+        let part = |part: &Range<usize>| {
+            let mut sums = Sums::zero(n);
+            let mut terms = Terms {
+                x: vec![0.0; n],
+                y: vec![0.0; n],
+                number: vec![0.0; if numbers { n } else { 0 }],
+            };
+            for i in part.clone() {
+                for others in [0..i, self.free..n] {
+                    if others.is_empty() {
+                        continue;
+                    }
+                    row(i, others.clone(), &mut terms);
+                    sums.add_terms(i, others, &terms);
+                }
+            }
+            sums
+        };
+        if let [all] = self.parts.as_slice() {
+            return part(all);
+        }
+        let parts: Vec<Sums> = self.parts.par_iter().map(part).collect();
+        parts
+            .into_iter()
+            .reduce(Sums::add)
+            .unwrap_or_else(|| Sums::zero(n))
+    }
+
     /// The norm of n P about its centroid: what pulls the points together, and pushes them apart at a minimum.
     fn typical_gradient(&self, layout: &Layout) -> f64 {
         let n = self.delta.n as f64;
@@ -197,21 +276,29 @@ impl Problem {
         n * (spread(&layout.x, centre[0]) + spread(&layout.y, centre[1])).sqrt()
     }
 
-    /// Each pair of free points is seen from both its ends, a pair with a fixed point from one.
     fn slope(&self, layout: &Layout) -> Slope {
-        let (n, f, sum) = (self.delta.n as f64, self.free, layout.sum());
-        let rows = for_rows(f, |i| {
-            let (at, delta) = (layout.point(i), self.delta.row(i));
-            let free = row_pull(at, &layout.x[..f], &layout.y[..f], &delta[..f]);
-            let fixed = row_pull(at, &layout.x[f..], &layout.y[f..], &delta[f..]);
-            let pull = [free[0] + fixed[0], free[1] + fixed[1]];
-            let gradient = [0, 1].map(|a| n * at[a] - sum[a] - pull[a]);
-            (pull, gradient, free[2] / 2.0 + fixed[2])
+        let sums = self.over_pairs(true, |i, others, terms| {
+            let (x, y) = (&layout.x[others.clone()], &layout.y[others.clone()]);
+            let delta = &self.delta.row(i)[others];
+            let Terms {
+                x: pull_x,
+                y: pull_y,
+                number,
+            } = terms;
+            pulls(layout.point(i), x, y, delta, pull_x, pull_y, number);
         });
+        let (n, f, all) = (self.delta.n as f64, self.free, layout.sum());
+        let pull = sums.first(f);
+        let attraction = |values: &[f64], sum: f64| -> Vec<f64> {
+            values[..f].iter().map(|v| n * v - sum).collect()
+        };
+        let mut gradient = attraction(&layout.x, all[0]);
+        gradient.extend(attraction(&layout.y, all[1]));
+        axpy(-1.0, &pull, &mut gradient);
         Slope {
-            pull: rows.iter().map(|r| r.0).collect(),
-            gradient: rows.iter().map(|r| r.1).collect(),
-            stress: rows.iter().map(|r| r.2).sum(),
+            pull,
+            gradient,
+            stress: sums.number,
         }
     }
 
@@ -220,53 +307,39 @@ impl Problem {
         let (n, f) = (self.delta.n, self.free);
         let all = layout.sum();
         let mut next = layout.clone();
-        for (axis, values) in [&mut next.x, &mut next.y].into_iter().enumerate() {
-            let pull: f64 = slope.pull.iter().map(|p| p[axis]).sum();
+        let pulls = slope.pull.split_at(f);
+        let axes = [
+            (&mut next.x, pulls.0, all[0]),
+            (&mut next.y, pulls.1, all[1]),
+        ];
+        for (values, pulls, sum) in axes {
+            let pull: f64 = pulls.iter().sum();
             let fixed: f64 = values[f..].iter().sum();
             let free = if f < n {
                 (f as f64 * fixed + pull) / (n - f) as f64
             } else {
-                all[axis]
+                sum
             };
-            for (value, pull) in values[..f].iter_mut().zip(&slope.pull) {
-                *value = (free + fixed + pull[axis]) / n as f64;
+            for (value, pull) in values[..f].iter_mut().zip(pulls) {
+                *value = (free + fixed + pull) / n as f64;
             }
         }
         next
     }
 
     /// The Hessian of half the stress times a displacement of the free points.
-    fn hessian_times(&self, layout: &Layout, step: &[Point]) -> Vec<Point> {
+    fn hessian_times(&self, layout: &Layout, step: &[f64]) -> Vec<f64> {
         let n = self.delta.n;
-        let mut moved = [vec![0.0; n], vec![0.0; n]];
-        for (i, s) in step.iter().enumerate() {
-            moved[0][i] = s[0];
-            moved[1][i] = s[1];
-        }
-        let [u, v] = &moved;
-        for_rows(self.free, |i| {
-            row_hessian(
-                layout.point(i),
-                step[i],
-                [&layout.x, &layout.y],
-                [u, v],
-                self.delta.row(i),
-            )
-        })
-    }
-}
-
-fn inner(a: &[Point], b: &[Point]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| a[0] * b[0] + a[1] * b[1])
-        .sum()
-}
-
-fn add_scaled(a: &mut [Point], factor: f64, b: &[Point]) {
-    for (a, b) in a.iter_mut().zip(b) {
-        a[0] += factor * b[0];
-        a[1] += factor * b[1];
+        let (mut u, mut v) = (vec![0.0; n], vec![0.0; n]);
+        u[..self.free].copy_from_slice(&step[..self.free]);
+        v[..self.free].copy_from_slice(&step[self.free..]);
+        let sums = self.over_pairs(false, |i, others, terms| {
+            let [x, y, u, v] = [&layout.x, &layout.y, &u, &v].map(|a| &a[others.clone()]);
+            let at = [layout.x[i], layout.y[i], step[i], step[self.free + i]];
+            let delta = &self.delta.row(i)[others.clone()];
+            gains(at, x, y, u, v, delta, [&mut terms.x, &mut terms.y]);
+        });
+        sums.first(self.free)
     }
 }
 
@@ -289,63 +362,63 @@ fn majorisation(problem: &Problem, mut layout: Layout) -> (Layout, Slope) {
 fn newton_step(
     problem: &Problem,
     layout: &Layout,
-    gradient: &[Point],
+    gradient: &[f64],
     radius: f64,
-) -> (Vec<Point>, f64) {
-    let norm = inner(gradient, gradient).sqrt();
+) -> (Vec<f64>, f64) {
+    let norm = norm_squared(gradient).sqrt();
     let relative = norm / problem.typical_gradient(layout);
-    let target = norm * (10.0 * relative).clamp(1e-4, 0.05);
-    let mut step = vec![[0.0; 2]; gradient.len()];
+    let target = norm * (1000.0 * relative).clamp(1e-4, 0.5);
+    let mut step = vec![0.0; gradient.len()];
     let mut residual = gradient.to_vec();
-    let mut direction: Vec<Point> = gradient.iter().map(|g| [-g[0], -g[1]]).collect();
-    let mut square = inner(&residual, &residual);
-    let mut image = vec![[0.0; 2]; gradient.len()];
-    for _ in 0..4 * gradient.len() {
+    let mut direction: Vec<f64> = gradient.iter().map(|g| -g).collect();
+    let mut square = norm_squared(&residual);
+    let mut image = vec![0.0; gradient.len()];
+    for _ in 0..2 * gradient.len() {
         let product = problem.hessian_times(layout, &direction);
-        let curvature = inner(&direction, &product);
-        let rounding = FLAT * problem.delta.n as f64 * inner(&direction, &direction);
+        let curvature = dot(&direction, &product);
+        let rounding = FLAT * problem.delta.n as f64 * norm_squared(&direction);
         if curvature.abs() <= rounding {
             break; // turning the whole layout costs nothing and gains nothing
         }
         let length = square / curvature;
         let mut next = step.clone();
-        add_scaled(&mut next, length, &direction);
-        if curvature < 0.0 || inner(&next, &next) > radius * radius {
+        axpy(length, &direction, &mut next);
+        if curvature < 0.0 || norm_squared(&next) > radius * radius {
             let to_edge = to_boundary(&step, &direction, radius);
-            add_scaled(&mut step, to_edge, &direction);
-            add_scaled(&mut image, to_edge, &product);
+            axpy(to_edge, &direction, &mut step);
+            axpy(to_edge, &product, &mut image);
             break;
         }
         step = next;
-        add_scaled(&mut image, length, &product);
-        add_scaled(&mut residual, length, &product);
-        let next_square = inner(&residual, &residual);
+        axpy(length, &product, &mut image);
+        axpy(length, &product, &mut residual);
+        let next_square = norm_squared(&residual);
         if next_square.sqrt() <= target {
             break;
         }
         for (d, r) in direction.iter_mut().zip(&residual) {
-            *d = [0, 1].map(|a| d[a] * (next_square / square) - r[a]);
+            *d = *d * (next_square / square) - r;
         }
         square = next_square;
     }
-    let predicted = -inner(gradient, &step) - inner(&image, &step) / 2.0;
+    let predicted = -dot(gradient, &step) - dot(&image, &step) / 2.0;
     (step, predicted)
 }
 
 /// The positive length at which step + length * direction leaves the disc.
-fn to_boundary(step: &[Point], direction: &[Point], radius: f64) -> f64 {
-    let a = inner(direction, direction);
-    let b = inner(step, direction);
-    let c = inner(step, step) - radius * radius;
+fn to_boundary(step: &[f64], direction: &[f64], radius: f64) -> f64 {
+    let a = norm_squared(direction);
+    let b = dot(step, direction);
+    let c = norm_squared(step) - radius * radius;
     (-b + (b * b - a * c).max(0.0).sqrt()) / a
 }
 
 /// Trust-region Newton until the gradient vanishes or rounding stops it.
 fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
     let scale = problem.typical_gradient(&layout);
-    let mut radius = scale / (10.0 * problem.delta.n as f64);
+    let mut radius = FIRST_RADIUS * norm_squared(&slope.gradient).sqrt() / problem.delta.n as f64;
     for _ in 0..NEWTON_STEPS {
-        let norm = inner(&slope.gradient, &slope.gradient).sqrt();
+        let norm = norm_squared(&slope.gradient).sqrt();
         if norm <= VANISHED * scale {
             break;
         }
@@ -354,7 +427,7 @@ fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
         let next_slope = problem.slope(&next);
         // Half the stress is what the model speaks of. Below rounding the gradient judges instead.
         let actual = (slope.stress - next_slope.stress) / 2.0;
-        let next_norm = inner(&next_slope.gradient, &next_slope.gradient).sqrt();
+        let next_norm = norm_squared(&next_slope.gradient).sqrt();
         let below_rounding = predicted <= 1e-11 * slope.stress;
         if below_rounding && next_norm >= norm {
             break;
@@ -364,7 +437,7 @@ fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
         } else {
             actual / predicted
         };
-        let length = inner(&step, &step).sqrt();
+        let length = norm_squared(&step).sqrt();
         if agreement < 0.25 {
             radius = length / 4.0;
         } else if agreement > 0.75 && length > 0.99 * radius {
@@ -391,10 +464,7 @@ pub fn scale(delta: &Dissimilarities, start: &[Point], pins: &[Pin]) -> Vec<Poin
     let (mut order, fixed): (Vec<usize>, Vec<usize>) = (0..start.len()).partition(|&i| !pinned[i]);
     let free = order.len();
     order.extend(fixed);
-    let problem = Problem {
-        delta: delta.permuted(&order),
-        free,
-    };
+    let problem = Problem::new(delta.permuted(&order), free);
     let layout = Layout {
         x: order.iter().map(|&i| start[i][0]).collect(),
         y: order.iter().map(|&i| start[i][1]).collect(),

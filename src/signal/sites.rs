@@ -3,10 +3,10 @@
 use faer::{Mat, MatRef};
 
 use super::Point;
-use super::thin_plate::{Frame, between};
+use super::thin_plate::{Frame, kernels};
 use crate::linalg::appended_qr::AppendedQr;
-use crate::linalg::dense::{FactorError, product, symmetric_eigen};
-use crate::linalg::kernels::{axpy, norm_squared};
+use crate::linalg::dense::{FactorError, symmetric_eigen};
+use crate::linalg::kernels::{axpy, norm_squared, sum};
 
 /// Errors smaller than this share of the data's norm count as 0 (reading 5).
 const NEGLIGIBLE: f64 = 1e-12;
@@ -39,7 +39,7 @@ pub fn site_order(
     candidates: &[bool],
 ) -> Result<SiteOrder, FactorError> {
     let mut search = Search::new(points, coordinates, candidates);
-    let distances = squared_plane_distances(coordinates)?;
+    let distances = plane_distances(coordinates)?;
     for _ in 0..count.min(4) {
         let Some(next) = search.farthest(&distances) else {
             break;
@@ -48,7 +48,7 @@ pub fn site_order(
     }
     search.begin();
     while search.order.len() < count {
-        let Some(next) = search.farthest(search.fit.row_squares()) else {
+        let Some(next) = search.farthest(&search.residual_norms()) else {
             break;
         };
         search.choose(next);
@@ -67,17 +67,19 @@ struct Search<'a> {
     /// Frames that may still become sites, the candidates before the others.
     open: Vec<bool>,
     candidates: &'a [bool],
-    /// Up to three sites that span the plane, by which the others meet the side conditions, and their kernels at every frame.
+    /// Up to three sites that span the plane, by which the others meet the side conditions.
     reference: Vec<usize>,
+    /// The kernels of the reference sites at every frame.
     reference_kernels: Vec<Vec<f64>>,
     fit: AppendedQr,
     residual_squares: Vec<f64>,
-    /// ||X||^2.
-    data: f64,
+    coordinates: MatRef<'a, f64>,
+    /// Errors up to this are equal to 0.
+    negligible: f64,
 }
 
 impl<'a> Search<'a> {
-    fn new(points: &[Point], coordinates: MatRef<'_, f64>, candidates: &'a [bool]) -> Self {
+    fn new(points: &[Point], coordinates: MatRef<'a, f64>, candidates: &'a [bool]) -> Self {
         let frame = Frame::new(points);
         Self {
             points: points.iter().map(|&p| frame.normalise(p)).collect(),
@@ -86,24 +88,24 @@ impl<'a> Search<'a> {
             candidates,
             reference: Vec::new(),
             reference_kernels: Vec::new(),
+            negligible: NEGLIGIBLE * coordinates.norm_l2(),
             fit: AppendedQr::new(coordinates.transpose()),
             residual_squares: Vec::new(),
-            data: coordinates.squared_norm_l2(),
+            coordinates,
         }
     }
 
-    /// The open frame with the greatest squared error, a candidate if there is one; the lowest index of equals, and what is negligible is equal to 0.
-    fn farthest(&self, squares: &[f64]) -> Option<usize> {
-        let negligible = NEGLIGIBLE * NEGLIGIBLE * self.data;
+    /// The open frame with the greatest value, a candidate if there is one; the lowest index of equals, and what is negligible is equal to 0.
+    fn farthest(&self, values: &[f64]) -> Option<usize> {
         let value = |i: usize| {
-            if squares[i] <= negligible {
+            if values[i] <= self.negligible {
                 0.0
             } else {
-                squares[i]
+                values[i]
             }
         };
         let worst = |candidate: bool| {
-            (0..squares.len())
+            (0..values.len())
                 .filter(|&i| self.open[i] && self.candidates[i] == candidate)
                 .reduce(|best, i| if value(i) > value(best) { i } else { best })
         };
@@ -112,10 +114,10 @@ impl<'a> Search<'a> {
 
     fn choose(&mut self, site: usize) {
         self.order.push(site);
-        for i in 0..self.points.len() {
-            if super::distance(self.points[i], self.points[site]) <= COINCIDENT {
-                self.open[i] = false;
-            }
+        let [x, y] = self.points[site];
+        for (open, p) in self.open.iter_mut().zip(&self.points) {
+            let apart = (p[0] - x).powi(2) + (p[1] - y).powi(2) > COINCIDENT * COINCIDENT;
+            *open = *open && apart;
         }
     }
 
@@ -153,28 +155,28 @@ impl<'a> Search<'a> {
         self.record();
     }
 
+    fn refer(&mut self, site: usize) {
+        self.reference.push(site);
+        self.reference_kernels.push(self.kernels(site));
+    }
+
+    fn kernels(&self, site: usize) -> Vec<f64> {
+        let mut values = vec![0.0; self.points.len()];
+        kernels(self.points[site], &self.points, &mut values);
+        values
+    }
+
     fn spanned(&self, site: usize) -> bool {
         let mut corners = self.reference.clone();
         corners.push(site);
         spread(&self.points, &corners) <= FLAT
     }
 
-    fn refer(&mut self, site: usize) {
-        self.reference.push(site);
-        self.reference_kernels.push(self.kernels(site));
-    }
-
-    /// phi(s - p) at every frame.
-    fn kernels(&self, site: usize) -> Vec<f64> {
-        let s = self.points[site];
-        self.points.iter().map(|&p| between(s, p)).collect()
-    }
-
     /// phi(s - p) less the barycentric mixture of the reference kernels, at every frame.
     fn kernel_column(&self, site: usize) -> Vec<f64> {
-        let weights = barycentric(&self.points, &self.reference, self.points[site]);
         let mut column = self.kernels(site);
-        for (kernels, weight) in self.reference_kernels.iter().zip(weights) {
+        let weights = barycentric(&self.points, &self.reference, self.points[site]);
+        for (weight, kernels) in weights.iter().zip(&self.reference_kernels) {
             axpy(-weight, kernels, &mut column);
         }
         column
@@ -185,32 +187,38 @@ impl<'a> Search<'a> {
     }
 
     fn record(&mut self) {
-        self.residual_squares
-            .push(self.fit.row_squares().iter().sum());
+        self.residual_squares.push(sum(self.fit.row_squares()));
+    }
+
+    /// The error of each frame.
+    fn residual_norms(&self) -> Vec<f64> {
+        let squares = self.fit.row_squares().iter();
+        squares.map(|square| square.sqrt()).collect()
     }
 
     /// Error (4) from three sites on; where the reference is not a triangle the spaces begin smaller and the entries before are dropped.
     fn errors(&self) -> Vec<f64> {
+        let total: f64 = self.coordinates.squared_norm_l2();
         let wanted = self.order.len().saturating_sub(2).max(1);
         let surplus = self.residual_squares.len().saturating_sub(wanted);
         self.residual_squares[surplus..]
             .iter()
-            .map(|&e| if e <= NEGLIGIBLE * self.data { 0.0 } else { e })
+            .map(|&e| if e <= NEGLIGIBLE * total { 0.0 } else { e })
             .collect()
     }
 }
 
-/// Squared distances of the columns of X to the best-fit plane, which passes through their centroid (reading 5). O(n m^2).
-fn squared_plane_distances(coordinates: MatRef<'_, f64>) -> Result<Vec<f64>, FactorError> {
+/// Distances of the columns of X to the best-fit plane, which passes through their centroid (reading 5). O(n m^2).
+fn plane_distances(coordinates: MatRef<'_, f64>) -> Result<Vec<f64>, FactorError> {
     let (m, n) = coordinates.shape();
     let mean: Vec<f64> = (0..m)
         .map(|a| (0..n).map(|i| coordinates[(a, i)]).sum::<f64>() / n as f64)
         .collect();
     let centred = Mat::from_fn(m, n, |a, i| coordinates[(a, i)] - mean[a]);
-    let axes = symmetric_eigen(product(centred.as_ref(), centred.transpose()).as_ref())?.vectors;
-    let across = product(axes.get(.., 2.min(m)..).transpose(), centred.as_ref());
+    let axes = symmetric_eigen((&centred * centred.transpose()).as_ref())?.vectors;
+    let across = axes.get(.., 2.min(m)..).transpose() * &centred;
     Ok((0..n)
-        .map(|i| norm_squared(across.col_as_slice(i)))
+        .map(|i| norm_squared(across.col_as_slice(i)).sqrt())
         .collect())
 }
 

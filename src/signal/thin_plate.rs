@@ -3,20 +3,52 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::Point;
+use crate::linalg::kernels::vectorised;
+
+/// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches, so that a loop over it
+/// becomes vector instructions, and with the same bits on every machine.
+#[inline(always)]
+fn ln(x: f64) -> f64 {
+    const LN2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+    const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    // x = 2^k (1 + f) with 1 + f between the square roots of 1/2 and 2; `biased` is k + 1023.
+    let shifted = x.to_bits() + (ONE - SQRT_HALF);
+    let biased = shifted >> 52;
+    let f = f64::from_bits((shifted & (!0 >> 12)) + SQRT_HALF) - 1.0;
+    // 2^52 + biased as the bits of a number: AVX2 cannot convert 64-bit integers.
+    let k = f64::from_bits(biased | 0x4330_0000_0000_0000) - (4_503_599_627_370_496.0 + 1023.0);
+    let s = f / (2.0 + f);
+    let (z, half) = (s * s, 0.5 * f * f);
+    let w = z * z;
+    let even = w
+        * (3.999_999_999_940_942e-1
+            + w * (2.222_219_843_214_978_4e-1 + w * 1.531_383_769_920_937_3e-1));
+    let odd = z
+        * (6.666_666_666_666_735e-1
+            + w * (2.857_142_874_366_239e-1
+                + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
+    s * (half + (odd + even)) + k * LN2[1] - half + f + k * LN2[0]
+}
 
 /// phi(r) = r^2 ln r as a function of r^2, with phi(0) = 0 (reading 4).
+#[inline(always)]
 pub fn kernel(r_squared: f64) -> f64 {
-    if r_squared > 0.0 {
-        0.5 * r_squared * r_squared.ln()
+    if r_squared >= f64::MIN_POSITIVE {
+        0.5 * r_squared * ln(r_squared)
     } else {
         0.0
     }
 }
 
-/// phi(||a - b||).
-pub fn between(a: Point, b: Point) -> f64 {
-    let (x, y) = (a[0] - b[0], a[1] - b[1]);
-    kernel(x * x + y * y)
+vectorised! {
+    /// phi(||site - p||) for each point p, into `values`.
+    pub fn kernels(site: Point, points: &[Point], values: &mut [f64]) {
+        for (value, p) in values.iter_mut().zip(points) {
+            let (x, y) = (site[0] - p[0], site[1] - p[1]);
+            *value = kernel(x * x + y * y);
+        }
+    }
 }
 
 /// Sites closer to a line than this share of their extent along it count as collinear.
@@ -88,8 +120,27 @@ mod tests {
     }
 
     #[test]
+    fn the_logarithm_is_that_of_the_standard_library() {
+        let mut x = f64::MIN_POSITIVE;
+        while x < 1e308 {
+            assert!((ln(x) - x.ln()).abs() <= f64::EPSILON * x.ln().abs(), "{x}");
+            x *= 1.0 + 1e-3;
+        }
+        for i in -1000..1000 {
+            let x = 1.0 + f64::from(i) * 1e-9;
+            assert!((ln(x) - x.ln()).abs() <= f64::EPSILON * x.ln().abs(), "{x}");
+        }
+    }
+
+    #[test]
     fn phi_is_r_squared_ln_r() {
         assert_eq!(kernel(0.0), 0.0);
-        assert!((between([1.0, 2.0], [4.0, 6.0]) - 25.0 * 5f64.ln()).abs() < 1e-12);
+        let points = [[4.0, 6.0], [1.0, 2.0], [1.0, 3.0], [1.0, 1e-170], [0.0; 2]];
+        let mut values = [1.0; 5];
+        kernels([1.0, 2.0], &points, &mut values);
+        assert!((values[0] - 25.0 * 5f64.ln()).abs() < 1e-12);
+        assert_eq!(values[1..3], [0.0, 0.0]);
+        kernels([1.0, 0.0], &points, &mut values);
+        assert_eq!(values[3], 0.0);
     }
 }
