@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::engine::{Engine, Outcome, Question};
-use crate::mesh::edges::unique_edges;
 use crate::mesh::measure::measure;
+use crate::mesh::topology::Topology;
 use crate::sequence::format::peer_tobj::{PeerFrame, read_with_tobj};
 use crate::stages::sequence::measured;
 
@@ -56,7 +56,7 @@ impl Engine for Tobj {
 
 fn measure_frame(frame: &PeerFrame) -> ([usize; 3], crate::mesh::measure::Measures) {
     let positions: Vec<f64> = frame.positions.iter().map(|&x| f64::from(x)).collect();
-    let boundary = unique_edges(&frame.triangles).boundary().count();
+    let boundary = Topology::new(&frame.triangles).boundary().count();
     (
         [frame.vertex_count(), frame.triangles.len(), boundary],
         measure(&positions, &frame.triangles),

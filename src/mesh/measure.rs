@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::edges::unique_edges;
+use super::topology::{Topology, components};
 use super::vector::{Point, cross, dot, norm, point, sub};
 
 /// The measures of one frame.
@@ -121,7 +121,7 @@ pub fn measure_frames(positions: &[f64], dimension: usize, faces: &[[u32; 3]]) -
 
 /// Counts what there is of a mesh of `vertex_count` vertices. O(V + F log F).
 pub fn counts(vertex_count: usize, faces: &[[u32; 3]]) -> Counts {
-    let edges = unique_edges(faces);
+    let topology = Topology::new(faces);
     let mut referenced = vec![false; vertex_count];
     for &v in faces.as_flattened() {
         referenced[v as usize] = true;
@@ -129,50 +129,12 @@ pub fn counts(vertex_count: usize, faces: &[[u32; 3]]) -> Counts {
     Counts {
         vertices: vertex_count,
         unreferenced: referenced.iter().filter(|r| !**r).count(),
-        edges: edges.vertices.len(),
+        edges: topology.edges().len(),
         faces: faces.len(),
-        boundary_edges: edges.boundary().count(),
-        non_manifold_edges: edges.non_manifold().count(),
+        boundary_edges: topology.boundary().count(),
+        non_manifold_edges: topology.non_manifold().count(),
         components: components(vertex_count, faces).1,
     }
-}
-
-/// The connected component of every vertex (two vertices of one face are connected), and how many there are.
-///
-/// Components are numbered from 0 by their smallest vertex; an unreferenced vertex is one of its own.
-pub fn components(vertex_count: usize, faces: &[[u32; 3]]) -> (Vec<u32>, usize) {
-    let mut parents: Vec<u32> = (0..vertex_count as u32).collect();
-    for &[a, b, c] in faces {
-        join(&mut parents, a, b);
-        join(&mut parents, b, c);
-    }
-    let mut labels = vec![0; vertex_count];
-    let mut count = 0;
-    for v in 0..vertex_count as u32 {
-        // A root is the smallest vertex of its component, so it comes first and has its label already.
-        let root = find(&mut parents, v);
-        labels[v as usize] = match root == v {
-            true => count,
-            false => labels[root as usize],
-        };
-        count += u32::from(root == v);
-    }
-    (labels, count as usize)
-}
-
-fn join(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(parents, a), find(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
-}
-
-/// The root of `v`, halving the path on the way.
-fn find(parents: &mut [u32], mut v: u32) -> u32 {
-    while parents[v as usize] != v {
-        let grandparent = parents[parents[v as usize] as usize];
-        parents[v as usize] = grandparent;
-        v = grandparent;
-    }
-    v
 }
 
 fn corners(positions: &[f64], face: &[u32; 3]) -> [Point; 3] {
@@ -251,10 +213,6 @@ mod tests {
         assert_eq!(
             (pieces.components, pieces.boundary_edges, pieces.euler()),
             (2, 7, 2)
-        );
-        assert_eq!(
-            components(7, &[[0, 5, 1], [3, 4, 6], [2, 5, 1]]).0,
-            [0, 0, 0, 1, 1, 0, 1]
         );
     }
 

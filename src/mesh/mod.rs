@@ -2,8 +2,8 @@
 
 mod connectivity;
 pub mod distance;
-pub mod edges;
 pub mod measure;
+pub mod topology;
 mod triangle;
 mod vector;
 

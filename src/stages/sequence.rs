@@ -8,8 +8,8 @@ use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
 use crate::mesh::distance::vertex_to_surface;
-use crate::mesh::edges::unique_edges;
 use crate::mesh::measure::{Measures, measure_frames};
+use crate::mesh::topology::Topology;
 use crate::sequence::format::read_files;
 
 /// Reading and measuring.
@@ -33,7 +33,7 @@ fn read(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
         |sequence| {
             let faces = sequence.connectivity().faces();
             let vertices = sequence.connectivity().vertex_count();
-            let boundary = unique_edges(faces).boundary().count();
+            let boundary = Topology::new(faces).boundary().count();
             let measures = measure_frames(sequence.positions(), sequence.dimension(), faces);
             measured(
                 &vec![[vertices, faces.len(), boundary]; measures.len()],
