@@ -5,6 +5,6 @@ pub mod distance;
 pub mod measure;
 pub mod topology;
 mod triangle;
-mod vector;
+pub(crate) mod vector;
 
 pub use connectivity::{Connectivity, ConnectivityError};
