@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::ShapeError;
 use crate::linalg::kernels::{LANES, total, vectorised};
 use crate::mesh::Connectivity;
-use crate::mesh::measure::{bounds, components};
+use crate::mesh::measure::bounds;
+use crate::mesh::topology::components;
 use crate::mesh::vector::{Point, along, cross, dot, norm, point, sub};
 
 /// A triangle with twice its area at most this share of its longest edge squared is degenerate.
