@@ -1,6 +1,7 @@
 //! Triangle meshes: validated connectivity and what is measured on it.
 
 mod connectivity;
+pub mod dihedral;
 pub mod distance;
 pub mod measure;
 pub mod topology;
