@@ -25,6 +25,12 @@ pub fn transposed_times(a: &Matrix, b: &Matrix) -> Matrix {
     b.map(|column| a.map(|row| dot(row, column)))
 }
 
+/// A B^T.
+#[inline(always)]
+pub fn times_transposed(a: &Matrix, b: &Matrix) -> Matrix {
+    times(a, &transposed(b))
+}
+
 /// A^T.
 #[inline(always)]
 pub fn transposed(a: &Matrix) -> Matrix {

@@ -9,10 +9,16 @@
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 
 mod deformation;
+pub mod frames;
 pub mod gradient;
+pub mod hinges;
+pub mod lric;
+pub mod placement;
 pub mod poisson;
 mod pool;
+pub mod posed;
 pub mod reference;
+pub mod surface;
 pub mod vertex;
 
 use std::fmt;

@@ -1,0 +1,107 @@
+//! A triangle of the reference in some frame: how it is stretched in its plane, and where it faces.
+//!
+//! In the plane's coordinates along the reference's u and v, and likewise those of the frame's triangle, the triangle is mapped by F2 = R2 U with a rotation
+//! R2 and U symmetric positive semi-definite: the *stretch*, which lengths alone decide.
+
+use super::reference::Triangle;
+use crate::linalg::rotation::{Matrix, plane_polar};
+use crate::mesh::vector::{Point, along, cross, dot, norm, sub};
+
+/// U_11, U_22, U_12.
+pub type Stretch = [f64; 3];
+
+/// The stretch of what has kept its shape.
+pub const UNSTRETCHED: Stretch = [1.0, 1.0, 0.0];
+
+/// U x.
+#[inline(always)]
+pub fn stretched([xx, yy, xy]: Stretch, [x, y]: [f64; 2]) -> [f64; 2] {
+    [xx * x + xy * y, xy * x + yy * y]
+}
+
+/// A triangle's stretch and its axes u, v and normal, turned by R2 from its first edge: the edge that is e in the reference's plane is [u v] U e.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posed {
+    pub stretch: Stretch,
+    pub axes: Matrix,
+}
+
+/// The axes of a triangle of the reference.
+pub fn rest_axes(rest: &Triangle) -> Matrix {
+    [rest.u, rest.v, rest.normal()]
+}
+
+/// Measures a triangle with these corners. One without an area faces, of all ways across it, the one nearest to the reference's.
+pub fn posed(rest: &Triangle, [a, b, c]: [Point; 3]) -> Posed {
+    let (e1, e2) = (sub(b, a), sub(c, a));
+    let first = unit(e1).or_else(|| unit(e2)).unwrap_or(rest.u);
+    let second = unit(across(e2, first)).unwrap_or_else(|| any_across(rest, first));
+    let polar = plane_polar(plane_map(
+        rest,
+        dot(e1, first),
+        dot(e2, first),
+        dot(e2, second),
+    ));
+    let [cos, sin] = polar.turn;
+    let axis = |x: f64, y: f64| std::array::from_fn(|i| x * first[i] + y * second[i]);
+    Posed {
+        stretch: polar.stretch,
+        axes: [axis(cos, sin), axis(-sin, cos), cross(first, second)],
+    }
+}
+
+/// The stretch of a triangle whose sides (a,b), (b,c) and (c,a) have these lengths. Negative ones count as 0; where one is longer than the other two
+/// together, it counts as just so long, and the triangle is flat.
+pub fn stretch_of_lengths(rest: &Triangle, sides: [f64; 3]) -> Stretch {
+    let [ab, bc, ca] = within_reach(sides.map(|x| x.max(0.0)));
+    let (foot, height) = match ab > 0.0 {
+        true => (
+            ((ab - bc) * (ab + bc) + ca * ca) / (2.0 * ab),
+            twice_area([ab, bc, ca]) / ab,
+        ),
+        false => (0.0, ca),
+    };
+    plane_polar(plane_map(rest, ab, foot, height)).stretch
+}
+
+/// By columns, the map of the plane that takes (length, 0) and (foot, height) of the reference to (length, 0) and (foot, height).
+fn plane_map(rest: &Triangle, length: f64, foot: f64, height: f64) -> [[f64; 2]; 2] {
+    let along = length / rest.length;
+    [
+        [along, 0.0],
+        [
+            (foot - along * rest.foot) / rest.height,
+            height / rest.height,
+        ],
+    ]
+}
+
+fn within_reach([ab, bc, ca]: [f64; 3]) -> [f64; 3] {
+    [ab.min(bc + ca), bc.min(ca + ab), ca.min(ab + bc)]
+}
+
+/// By Heron's formula, ordered so that thin triangles lose nothing (Kahan 2000).
+fn twice_area(mut sides: [f64; 3]) -> f64 {
+    sides.sort_unstable_by(|x, y| y.total_cmp(x));
+    let [a, b, c] = sides;
+    let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
+    0.5 * product.max(0.0).sqrt()
+}
+
+fn across(x: Point, axis: Point) -> Point {
+    let once = along(x, -dot(x, axis), axis);
+    // Once more, because a thin triangle leaves little.
+    along(once, -dot(once, axis), axis)
+}
+
+fn any_across(rest: &Triangle, first: Point) -> Point {
+    // One of two orthogonal directions is far from `first`.
+    let [normal, u] = [rest.normal(), rest.u].map(|n| across(n, first));
+    let facing = if norm(normal) > 0.1 { normal } else { u };
+    cross(unit(facing).unwrap_or(rest.v), first)
+}
+
+fn unit(x: Point) -> Option<Point> {
+    let length = norm(x);
+    (length > 0.0).then(|| x.map(|x| x / length))
+}
