@@ -8,6 +8,7 @@
 //! | [`mesh`] | connectivity, measures (area, volume, bounds), distance to a surface |
 //! | [`linalg`] | what is thin over faer and nalgebra |
 //! | [`sequence`] | deforming sequences, their file formats and the embedded `@name` sequences |
+//! | [`shape`] | shape spaces: frames as vectors of numbers other than positions, and back |
 //! | [`signal`] | Cashman & Hormann 2012: time, pose and shape signals |
 //! | [`stages`] | the algorithms as named stages over typed arrays |
 //! | [`harness`] | cases, engines, checks, verdicts, timing, records |
@@ -21,5 +22,6 @@ pub mod linalg;
 pub mod mesh;
 pub mod report;
 pub mod sequence;
+pub mod shape;
 pub mod signal;
 pub mod stages;

@@ -6,3 +6,5 @@ pub mod banded;
 pub mod dense;
 pub mod kernels;
 pub mod pca;
+pub mod rotation;
+pub mod sparse;

@@ -5,6 +5,6 @@ pub mod distance;
 pub mod edges;
 pub mod measure;
 mod triangle;
-mod vector;
+pub(crate) mod vector;
 
 pub use connectivity::{Connectivity, ConnectivityError};

@@ -1,0 +1,236 @@
+//! Shape spaces: a frame as a vector of numbers other than its positions, and back (Cashman & Hormann 2012, section 5).
+//!
+//! Everything of a space is over one connectivity and one *reference* frame. `oracles/PROTOCOL.md` lays down the numbers of each, their order, units
+//! and signs, and the rules for degenerate triangles, several components, boundaries and edges that are not manifold.
+//!
+//! | space | d | what its numbers are |
+//! |---|---|---|
+//! | [`vertex`] | 3V | positions |
+//! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
+
+mod deformation;
+pub mod gradient;
+pub mod poisson;
+mod pool;
+pub mod reference;
+pub mod vertex;
+
+use std::fmt;
+use std::str::FromStr;
+
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::linalg::sparse::FactorError;
+use crate::sequence::Sequence;
+
+/// Which space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SpaceKind {
+    /// Positions.
+    Vertex,
+    /// Deformation gradients (Sumner & Popovic 2004).
+    Gradient,
+    /// Linear rotation-invariant coordinates (Lipman et al. 2005).
+    Lric,
+    /// Edge lengths and dihedral angles (Winkler et al. 2010; Froehlich & Botsch 2011).
+    Lengths,
+    /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
+    Patch,
+}
+
+impl SpaceKind {
+    /// Every space, in the order of the paper.
+    pub const ALL: [Self; 5] = [
+        Self::Vertex,
+        Self::Gradient,
+        Self::Lric,
+        Self::Lengths,
+        Self::Patch,
+    ];
+
+    /// Its name on the command line and in stages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vertex => "vertex",
+            Self::Gradient => "gradient",
+            Self::Lric => "lric",
+            Self::Lengths => "lengths",
+            Self::Patch => "patch",
+        }
+    }
+}
+
+impl fmt::Display for SpaceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A name that no space has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("there is no shape space `{0}`; there are vertex, gradient, lric, lengths and patch")]
+pub struct UnknownSpace(String);
+
+impl FromStr for SpaceKind {
+    type Err = UnknownSpace;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSpace> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|kind| kind.name() == name)
+            .ok_or_else(|| UnknownSpace(name.into()))
+    }
+}
+
+/// Why a shape space, a vector in it or a frame could not be had.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum ShapeError {
+    /// A frame or vector of another size than the space's.
+    #[error(
+        "{what}: expected {expected} numbers, found {found}; is it of the connectivity and reference of this space?"
+    )]
+    WrongLength {
+        what: &'static str,
+        expected: usize,
+        found: usize,
+    },
+    /// NaN or infinite.
+    #[error("{what}: number {index} (0-based) is not finite")]
+    NotFinite { what: &'static str, index: usize },
+    /// See [`FactorError`].
+    #[error("the equations of the reference frame cannot be solved: {0}")]
+    Factor(#[from] FactorError),
+    /// A space that is not there yet.
+    #[error("there is no {kind} space yet")]
+    Unavailable { kind: SpaceKind },
+    /// What is wrong with one of several frames.
+    #[error("frame {frame} (1-based): {source}")]
+    Frame {
+        frame: usize,
+        source: Box<ShapeError>,
+    },
+}
+
+/// A shape space over one connectivity and reference.
+///
+/// Positions are x0 y0 z0 x1 ... (3V numbers), vectors z have d numbers. Spaces keep their factors, so that `decode` only solves; both directions run
+/// on the calling thread, and frames are best taken in parallel, as [`encode_all`] does.
+pub trait Space: Send + Sync {
+    /// Which space.
+    fn kind(&self) -> SpaceKind;
+
+    /// d.
+    fn dimension(&self) -> usize;
+
+    /// 3V, the numbers of a frame.
+    fn frame_len(&self) -> usize;
+
+    /// The vector of a frame, with angles in their principal branches.
+    fn encode(&self, positions: &[f64], z: &mut [f64]) -> Result<(), ShapeError>;
+
+    /// The frame of a vector.
+    fn decode(&self, z: &[f64], positions: &mut [f64]) -> Result<(), ShapeError>;
+
+    /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
+    fn unwrap(&self, _previous: &[f64], _z: &mut [f64]) {}
+
+    /// Chooses the branches of the angles in `z` so that neighbours on the surface differ little. Nothing where there are no angles.
+    fn unwrap_surface(&self, _z: &mut [f64]) {}
+}
+
+/// How the branches of angles are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Branches {
+    /// Over the surface in the first frame, then nearest to the frame before: for motions.
+    #[default]
+    Time,
+    /// Over the surface in every frame: for poses that have little to do with each other.
+    Surface,
+}
+
+/// Prepares a space over the connectivity of `sequence` and a reference frame of 3V positions. The sequence's frames matter to the patch space
+/// alone, which finds its patches from them.
+pub fn prepare(
+    kind: SpaceKind,
+    sequence: &Sequence,
+    reference: &[f64],
+) -> Result<Box<dyn Space>, ShapeError> {
+    let connectivity = sequence.connectivity().clone();
+    Ok(match kind {
+        SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
+        SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
+        SpaceKind::Lric | SpaceKind::Lengths | SpaceKind::Patch => {
+            return Err(ShapeError::Unavailable { kind });
+        }
+    })
+}
+
+/// The vectors of n frames (n x 3V positions, frame after frame) as the columns of a d x n matrix. Frames run in parallel, then branches are
+/// chosen; the result does not depend on the number of threads.
+pub fn encode_all(
+    space: &dyn Space,
+    frames: &[f64],
+    branches: Branches,
+) -> Result<Mat<f64>, ShapeError> {
+    let len = space.frame_len().max(1);
+    let n = frames.len() / len;
+    reference::check_len("frames", frames, n * len)?;
+    let mut z = Mat::zeros(space.dimension(), n);
+    // The columns of a matrix of our own are contiguous.
+    let columns = z
+        .col_iter_mut()
+        .filter_map(|column| column.try_as_col_major_mut());
+    let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
+    let both = columns.par_iter_mut().zip(frames.par_chunks_exact(len));
+    first_error(both.enumerate().map(|(i, (z, frame))| {
+        space.encode(frame, z).map_err(|e| e.of_frame(i))?;
+        if branches == Branches::Surface || i == 0 {
+            space.unwrap_surface(z);
+        }
+        Ok(())
+    }))?;
+    if branches == Branches::Time {
+        for i in 1..n {
+            let (before, after) = columns.split_at_mut(i);
+            space.unwrap(before[i - 1], after[0]);
+        }
+    }
+    Ok(z)
+}
+
+/// The frames (n x 3V positions) of the columns of a d x n matrix, in parallel.
+pub fn decode_all(space: &dyn Space, z: MatRef<'_, f64>) -> Result<Vec<f64>, ShapeError> {
+    let len = space.frame_len();
+    let mut frames = vec![0.0; len * z.ncols()];
+    let outcomes = frames
+        .par_chunks_exact_mut(len.max(1))
+        .enumerate()
+        .map(|(i, frame)| {
+            let column = z.col(i);
+            let decoded = match column.try_as_col_major() {
+                Some(column) => space.decode(column.as_slice(), frame),
+                None => space.decode(&column.iter().copied().collect::<Vec<_>>(), frame),
+            };
+            decoded.map_err(|e| e.of_frame(i))
+        });
+    first_error(outcomes)?;
+    Ok(frames)
+}
+
+impl ShapeError {
+    /// The same, of frame `index` (0-based).
+    fn of_frame(self, index: usize) -> Self {
+        Self::Frame {
+            frame: index + 1,
+            source: Box::new(self),
+        }
+    }
+}
+
+/// The error of the lowest index, so that it does not depend on which thread is the fastest.
+fn first_error(
+    outcomes: impl IndexedParallelIterator<Item = Result<(), ShapeError>>,
+) -> Result<(), ShapeError> {
+    outcomes.collect::<Vec<_>>().into_iter().collect()
+}
