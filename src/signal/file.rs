@@ -65,7 +65,6 @@ pub enum RepresentationError {
 /// Writes the representation; the file appears whole or not at all.
 pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
     let r = &stored.representation;
-    let faces = stored.connectivity.faces();
     let meta = serde_json::json!({"format": FORMAT, "space": SPACE}).to_string();
     let arrays = [
         ("h0", Array::vector(&r.offset)),
@@ -76,13 +75,7 @@ pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
         ("u", Array::vector(&r.time.spline.knots)),
         ("t", Array::vector(&r.time.parameters)),
         ("p", Array::points(&stored.positions)),
-        (
-            "F",
-            Array::I64 {
-                shape: vec![faces.len(), 3],
-                data: faces.as_flattened().iter().map(|&v| v.into()).collect(),
-            },
-        ),
+        ("F", Array::triangles(stored.connectivity.faces())),
         ("meta", Array::Text(meta)),
     ];
     Ok(npz::write_arrays(path, &arrays)?)
