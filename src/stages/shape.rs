@@ -6,7 +6,7 @@ use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::shape::{Branches, Space, SpaceKind, decode_all, encode_all, prepare};
+use crate::shape::{Branches, Space, SpaceKind, decode_all, encode_all, prepare, prepare_alone};
 
 /// By space, encoding before decoding.
 pub static STAGES: &[Stage] = &[
@@ -70,9 +70,7 @@ fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError>
     }
     let connectivity =
         Connectivity::new(shape[0], inputs.triangles("F")?).map_err(StageError::from_error)?;
-    let alone = Sequence::new(connectivity.into(), 1, reference.to_vec());
-    let alone = alone.map_err(StageError::from_error)?;
-    prepare(kind, &alone, reference).map_err(StageError::from_error)
+    prepare_alone(kind, connectivity.into(), reference).map_err(StageError::from_error)
 }
 
 /// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
