@@ -46,6 +46,14 @@ impl Array {
         }
     }
 
+    /// Triangles as an (F, 3) array of 0-based indices.
+    pub fn triangles(faces: &[[u32; 3]]) -> Self {
+        Self::I64 {
+            shape: vec![faces.len(), 3],
+            data: faces.as_flattened().iter().map(|&v| v.into()).collect(),
+        }
+    }
+
     /// A matrix whose columns become the rows of the array, so that nothing moves in memory: m x n becomes (n, m).
     pub fn columns(matrix: MatRef<'_, f64>) -> Self {
         Self::F64 {

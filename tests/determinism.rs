@@ -10,6 +10,7 @@ use faer::MatRef;
 use meshseq::sequence::Sequence;
 use meshseq::sequence::dataset::open;
 use meshseq::sequence::format::write;
+use meshseq::shape::SpaceKind;
 use meshseq::signal::fidelity::fit_to_error;
 use meshseq::signal::file::{Stored, load, save};
 use meshseq::signal::fit::{Fit, FitOptions, fit};
@@ -159,6 +160,8 @@ fn representations_load_back_bit_for_bit() {
             representation: fit.representation,
             positions: fit.positions,
             connectivity: gallop.connectivity().clone(),
+            space: SpaceKind::Vertex,
+            reference: Vec::new(),
         };
         let (bytes, loaded) = saved(&stored, &scratch.at("a.npz"));
         assert_eq!(all_bits(&stored), all_bits(&loaded));

@@ -12,9 +12,11 @@ use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
 use crate::sequence::format::write;
+use crate::shape::{SpaceKind, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, load, save};
-use crate::signal::fit::{Fit, FitError, FitOptions, fit};
+use crate::signal::fit::{FitError, FitOptions, fit};
+use crate::signal::in_space::{SpaceFit, fit_in_space, fit_in_space_to_rms};
 use crate::signal::knots::KnotRule;
 use crate::signal::pins::{Pin, validate_pins};
 
@@ -62,6 +64,12 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
+    /// Shape space: vertex or gradient
+    #[arg(long, default_value = "vertex", value_name = "SPACE")]
+    space: String,
+    /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
     /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
     #[arg(long, default_value = "symmetric", value_name = "RULE")]
     knots: String,
@@ -82,6 +90,7 @@ impl FitVerb {
             .knots
             .parse()
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
+        let space: SpaceKind = self.space.parse()?;
         if let Some(out) = self
             .out
             .as_ref()
@@ -104,34 +113,19 @@ impl FitVerb {
             Some(path) => read_pins(path, sequence.frame_count())?,
             None => Vec::new(),
         };
-        let d = sequence.dimension();
-        let frames =
-            MatRef::from_column_major_slice(sequence.positions(), d, sequence.frame_count());
-        let fitted = match (self.tolerance, self.k, self.l, self.m) {
-            (None, Some(k), Some(l), Some(m)) => fit(
-                frames,
-                &FitOptions {
-                    k,
-                    l,
-                    m,
-                    knots,
-                    pins,
-                },
-            )?,
-            (tolerance, ..) => {
-                let most = allowed_error(&sequence, tolerance.unwrap_or(f64::NAN));
-                fit_to_error(frames, most, knots, &pins)?
-            }
-        };
-        let numbers = numbers(&sequence, &fitted, knots);
+        let reference = self.reference(&sequence, space)?;
+        let fitted = self.fit(&sequence, space, &reference, knots, pins)?;
+        let numbers = numbers(&sequence, &fitted, space, knots);
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
         if let Some(out) = &self.out {
             let stored = Stored {
-                representation: fitted.representation,
-                positions: fitted.positions,
+                representation: fitted.fit.representation,
+                positions: fitted.fit.positions,
                 connectivity: sequence.connectivity().clone(),
+                space,
+                reference,
             };
             save(&stored, out)?;
         }
@@ -140,6 +134,72 @@ impl FitVerb {
         }
         say(&describe(&self.sequence, &numbers));
         Ok(true)
+    }
+
+    /// The reference frame that is asked for; none in vertex space.
+    fn reference(&self, sequence: &Sequence, space: SpaceKind) -> Result<Vec<f64>, Failure> {
+        match &self.reference {
+            Some(path) if space == SpaceKind::Vertex => Err(format!(
+                "--reference {}: vertex space has no reference frame; choose another --space",
+                path.display()
+            )
+            .into()),
+            Some(path) => {
+                let found = crate::sequence::format::read(path)?;
+                if found.connectivity() != sequence.connectivity() {
+                    return Err(format!(
+                        "--reference {}: another mesh than {}; expected the same faces in the same order",
+                        path.display(),
+                        self.sequence
+                    )
+                    .into());
+                }
+                Ok(found.frame(0).to_vec())
+            }
+            None if space == SpaceKind::Vertex => Ok(Vec::new()),
+            None => Ok(sequence.frame(0).to_vec()),
+        }
+    }
+
+    fn fit(
+        &self,
+        sequence: &Sequence,
+        space: SpaceKind,
+        reference: &[f64],
+        knots: KnotRule,
+        pins: Vec<Pin>,
+    ) -> Result<SpaceFit, Failure> {
+        let constants = match (self.k, self.l, self.m) {
+            (Some(k), Some(l), Some(m)) => Some(FitOptions {
+                k,
+                l,
+                m,
+                knots,
+                pins: pins.clone(),
+            }),
+            _ => None,
+        };
+        let tolerance = self.tolerance.unwrap_or(f64::NAN);
+        if space == SpaceKind::Vertex {
+            let (d, n) = (sequence.dimension(), sequence.frame_count());
+            let frames = MatRef::from_column_major_slice(sequence.positions(), d, n);
+            let fit = match &constants {
+                Some(options) => fit(frames, options)?,
+                None => fit_to_error(frames, allowed_error(sequence, tolerance), knots, &pins)?,
+            };
+            let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
+            return Ok(SpaceFit { fit, rms });
+        }
+        let prepared = prepare(space, sequence, reference)?;
+        let frames = sequence.positions();
+        Ok(match &constants {
+            Some(options) => fit_in_space(&*prepared, frames, options)?,
+            None => {
+                let size = bounds(sequence.frame(0)).diagonal();
+                let rms = (tolerance * size).max(f64::MIN_POSITIVE);
+                fit_in_space_to_rms(&*prepared, frames, rms, knots, &pins)?
+            }
+        })
     }
 }
 
@@ -153,22 +213,28 @@ fn allowed_error(sequence: &Sequence, relative: f64) -> f64 {
 }
 
 /// Everything that `--json` holds.
-fn numbers(sequence: &Sequence, fit: &Fit, knots: KnotRule) -> serde_json::Value {
+fn numbers(
+    sequence: &Sequence,
+    found: &SpaceFit,
+    space: SpaceKind,
+    knots: KnotRule,
+) -> serde_json::Value {
+    let fit = &found.fit;
     let (k, l, m) = fit.klm();
     let (n, vertices) = (
         sequence.frame_count(),
         sequence.connectivity().vertex_count(),
     );
-    let rms = (fit.errors.psi / (n * vertices) as f64).sqrt();
+    let distance = found.rms * ((n * vertices) as f64).sqrt();
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
     let t = fit.timings;
     json!({
-        "n": n, "d": sequence.dimension(), "k": k, "l": l, "m": m,
+        "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "V": vertices, "F": sequence.connectivity().faces().len(),
-        "space": "vertex", "knots": knots.to_string(),
+        "space": space.name(), "knots": knots.to_string(),
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
-        "relative_rms": ratio(rms, bounds(sequence.frame(0)).diagonal()),
-        "kg_percent": 100.0 * ratio(fit.errors.psi.sqrt(), spread(sequence)),
+        "relative_rms": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
+        "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
         "same_pose": fit.same_pose,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
@@ -199,10 +265,11 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
     let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
     format!(
-        "{name}: n = {}, k = {}, l = {}, m = {}, {} knots\n\
+        "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
          ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
+        v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],
         v["l"],
@@ -215,7 +282,7 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         100.0 * number("relative_rms"),
         number("kg_percent"),
         v["stored_numbers"],
-        v["n"].as_u64().unwrap_or(0) * v["d"].as_u64().unwrap_or(0),
+        3 * v["n"].as_u64().unwrap_or(0) * v["V"].as_u64().unwrap_or(0),
         t("h"),
         t("mds"),
         t("rbf"),
@@ -297,7 +364,8 @@ impl SampleVerb {
         let n = stored.representation.time.frame_count() as f64;
         let times = self.frame_times(n)?;
         check_memory(times.len(), stored.representation.dimension())?;
-        let frames = stored.representation.evaluate(&times);
+        let frames = stored.sample(&times);
+        let frames = frames.map_err(|e| format!("{}: {e}", self.representation.display()))?;
         let sequence = Sequence::new(stored.connectivity, times.len(), frames)
             .map_err(|e| format!("{}: sampled, {e}", self.representation.display()))?;
         write(&sequence, &self.out)?;

@@ -43,6 +43,24 @@ faults! {
         Outputs(|_, out| numbers(out, "hausdorff", stretch));
     "distance-squared" in "sequence.distance": "mean of squared distances",
         Outputs(|_, out| numbers(out, "mean", |m| m.iter_mut().for_each(|x| *x *= *x)));
+    "gradient-transposed" in "shape.gradient_encode": "rotations the other way round",
+        Outputs(|inputs, out| each_triangle(inputs, out, |numbers| numbers[..3].iter_mut().for_each(|x| *x = -*x)));
+    "gradient-relative" in "shape.gradient_encode": "stretches a millionth too large",
+        Outputs(|inputs, out| each_triangle(inputs, out, |numbers| stretch(&mut numbers[3..])));
+    "gradient-off-diagonal" in "shape.gradient_encode": "off-diagonal stretches without their square root of 2",
+        Outputs(|inputs, out| each_triangle(inputs, out, |numbers| numbers[6..].iter_mut().for_each(|x| *x /= 2f64.sqrt())));
+    "gradient-centre-dropped" in "shape.gradient_encode": "the centre of the last frame left at the origin",
+        Outputs(|_, out| numbers(out, "z", |z| { let n = z.len(); z[n - 3..].fill(0.0) }));
+    "poisson-weights" in "shape.gradient_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
+    "poisson-triangle-dropped" in "shape.gradient_decode": "the first triangle of the last frame as in the reference",
+        Inputs(|inputs| {
+            let d = row_length(inputs, "z");
+            let still = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+            numbers(inputs, "z", |z| { let at = z.len() - d; z[at..at + 9].copy_from_slice(&still) });
+        });
+    "poisson-wrong-frame" in "shape.gradient_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "h-sign" in "signal.h": "first direction and its coordinates negated",
         Outputs(|inputs, out| {
             let d = row_length(inputs, "Z");
@@ -168,6 +186,16 @@ fn integers(bundle: &mut Bundle, name: &str, change: impl FnOnce(&mut [i64])) {
     if let Some(Array::I64 { data, .. }) = bundle.0.get_mut(name) {
         change(data);
     }
+}
+
+/// The nine numbers of every triangle of every frame of a gradient encoding.
+fn each_triangle(inputs: &Bundle, out: &mut Bundle, change: impl Fn(&mut [f64])) {
+    let triangles = inputs.triangles("F").map_or(0, |faces| faces.len());
+    let d = row_length(out, "z");
+    numbers(out, "z", |z| {
+        let rows = z.chunks_mut(d);
+        rows.for_each(|row| row[..9 * triangles].chunks_mut(9).for_each(&change));
+    });
 }
 
 /// Drops the last row of an array.

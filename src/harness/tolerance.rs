@@ -37,6 +37,17 @@ tolerances! {
         "hausdorff_difference" <= 1e-12, "exact distances up to rounding";
         "mean_difference" <= 1e-12, "exact distances up to rounding";
     }
+    "shape.gradient_encode" {
+        "formula" <= 1e-12, "R S times the reference's edges are the frame's edges, over the diagonal";
+        "stretch" <= 1e-12, "a stretch has no negative eigenvalue";
+        "centres" <= 1e-13, "a mean of vertices, over the diagonal";
+        "rotation_difference" <= 1e-10, "slivers: eps over the ratio of height to length, 1e-3 on real meshes, and more where two stretches nearly vanish";
+        "number_difference" <= 1e-10, "as rotations";
+    }
+    "shape.gradient_decode" {
+        "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
+        "frame_difference" <= 1e-11, "the same Poisson equation by another factorisation, over the diagonal";
+    }
     "signal.h" {
         "mean" <= 1e-14, "a mean of n frames";
         "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";

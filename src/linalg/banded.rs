@@ -1,5 +1,7 @@
 //! Least squares with a band of four: the systems of cubic splines.
 
+use super::kernels::vectorised;
+
 /// Entries a row.
 pub const BAND: usize = 4;
 const INVERSE_STEPS: usize = 4;
@@ -135,9 +137,167 @@ impl BandedLeastSquares {
     }
 }
 
+/// Adds blocks of four neighbouring lines to a vector of lines. Blocks that come in order meet in registers: memory sees each line once.
+pub struct Gather<'a, const N: usize> {
+    sum: &'a mut [[f64; N]],
+    first: usize,
+    held: [[f64; N]; BAND],
+}
+
+impl<'a, const N: usize> Gather<'a, N> {
+    /// Into `sum`, at least four lines.
+    #[inline(always)]
+    pub fn new(sum: &'a mut [[f64; N]]) -> Self {
+        Self {
+            sum,
+            first: 0,
+            held: [[0.0; N]; BAND],
+        }
+    }
+
+    /// Adds `block` to the lines `first ..`.
+    #[inline(always)]
+    pub fn add(&mut self, first: usize, block: [[f64; N]; BAND]) {
+        if first < self.first {
+            (0..BAND).for_each(|_| self.step());
+            self.first = first;
+        }
+        while self.first < first {
+            self.step();
+        }
+        for (held, line) in self.held.iter_mut().zip(block) {
+            for j in 0..N {
+                held[j] += line[j];
+            }
+        }
+    }
+
+    /// Writes what is held.
+    #[inline(always)]
+    pub fn finish(mut self) {
+        (0..BAND).for_each(|_| self.step());
+    }
+
+    #[inline(always)]
+    fn step(&mut self) {
+        let [a, b, c, d] = self.held;
+        if let Some(line) = self.sum.get_mut(self.first) {
+            for j in 0..N {
+                line[j] += a[j];
+            }
+        }
+        self.held = [b, c, d, [0.0; N]];
+        self.first += 1;
+    }
+}
+
+vectorised! {
+    /// The upper half of the band of A^T A.
+    pub fn products(equations: &[(usize, [f64; BAND])], sum: &mut [[f64; BAND]]) -> () {
+        let mut gather = Gather::new(sum);
+        for &(first, [a, b, c, d]) in equations {
+            let shifted = [[a, b, c, d], [b, c, d, 0.0], [c, d, 0.0, 0.0], [d, 0.0, 0.0, 0.0]];
+            let heads = [a, b, c, d];
+            gather.add(first, std::array::from_fn(|i| shifted[i].map(|x| x * heads[i])));
+        }
+        gather.finish();
+    }
+}
+
+/// The same least squares by its normal equations, U^T D U = A^T A: a third of the work of the rotations, for well-conditioned equations.
+///
+/// The error grows with the square of the condition, so the caller refines once and looks at how far that moved the solution.
+pub struct BandedNormal {
+    /// Diagonal and three entries right of it of A^T A, then of U with the diagonal inverted.
+    rows: Vec<[f64; BAND]>,
+}
+
+impl BandedNormal {
+    /// Of the equations with coefficients `row` from unknown `first` on, for `columns` unknowns; None where a pivot falls below `least` of its
+    /// diagonal entry. O(rows + columns).
+    pub fn new(columns: usize, equations: &[(usize, [f64; BAND])], least: f64) -> Option<Self> {
+        let mut rows = vec![[0.0; BAND]; columns];
+        products(equations, &mut rows);
+        let mut whole = [[0.0; BAND]; BAND];
+        for i in 0..columns {
+            let [pivot, a, b, c] = rows[i];
+            // `whole` carries what eliminations have taken from the next rows, so that no row waits for memory.
+            let line: [f64; BAND] = std::array::from_fn(|j| [pivot, a, b, c][j] - whole[0][j]);
+            if line[0].is_nan() || line[0] <= least * pivot {
+                return None;
+            }
+            let inverse = 1.0 / line[0];
+            let unit = [line[1] * inverse, line[2] * inverse, line[3] * inverse];
+            let next = |r: usize, j: usize| {
+                if r + j < 3 {
+                    unit[r] * line[r + j + 1]
+                } else {
+                    0.0
+                }
+            };
+            whole = std::array::from_fn(|r| {
+                std::array::from_fn(|j| {
+                    let taken = if r + 1 < BAND { whole[r + 1][j] } else { 0.0 };
+                    taken + if r < 3 { next(r, j) } else { 0.0 }
+                })
+            });
+            rows[i] = [inverse, unit[0], unit[1], unit[2]];
+        }
+        Some(Self { rows })
+    }
+
+    /// Turns A^T b into the unknowns. O(columns).
+    pub fn solve_in_place(&self, x: &mut [[f64; 2]]) {
+        let n = self.rows.len();
+        let mut ahead = [[0.0; 2]; BAND];
+        for i in 0..n {
+            let [inverse, a, b, c] = self.rows[i];
+            let value = [x[i][0] - ahead[0][0], x[i][1] - ahead[0][1]];
+            for (j, u) in [a, b, c].into_iter().enumerate() {
+                ahead[j] = std::array::from_fn(|axis| ahead[j + 1][axis] + u * value[axis]);
+            }
+            x[i] = value.map(|v| v * inverse);
+        }
+        let mut known = [[0.0; 2]; BAND - 1];
+        for i in (0..n).rev() {
+            let [_, a, b, c] = self.rows[i];
+            let value = std::array::from_fn(|axis| {
+                x[i][axis] - a * known[0][axis] - b * known[1][axis] - c * known[2][axis]
+            });
+            known = [value, known[0], known[1]];
+            x[i] = value;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn normal_equations_solve_and_refuse() {
+        let truth: Vec<[f64; 2]> = (0..9).map(|i| [i as f64, (i * i) as f64]).collect();
+        let row = |i: usize| [1.0 + i as f64 * 0.1, 0.3, (i as f64).sin(), -0.4];
+        let equations: Vec<_> = (0..30).map(|i| (i * 6 / 30, row(i))).collect();
+        let mut x = vec![[0.0; 2]; 9];
+        for (first, row) in &equations {
+            for axis in 0..2 {
+                let b: f64 = (0..BAND).map(|j| row[j] * truth[first + j][axis]).sum();
+                (0..BAND).for_each(|j| x[first + j][axis] += row[j] * b);
+            }
+        }
+        BandedNormal::new(9, &equations, 1e-8)
+            .unwrap()
+            .solve_in_place(&mut x);
+        for (x, t) in x.iter().zip(&truth) {
+            assert!(
+                (x[0] - t[0]).abs() < 1e-9 && (x[1] - t[1]).abs() < 1e-9,
+                "{x:?} {t:?}"
+            );
+        }
+        // Unknown 8 appears in no equation of the first ten.
+        assert!(BandedNormal::new(9, &equations[..10], 1e-8).is_none());
+    }
 
     #[test]
     fn a_matrix_can_be_singular_though_no_pivot_is_small() {

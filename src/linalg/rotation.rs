@@ -128,8 +128,7 @@ fn newton(mut x: Matrix) -> Option<Matrix> {
     for _ in 0..12 {
         let cofactors = [cross(x[1], x[2]), cross(x[2], x[0]), cross(x[0], x[1])];
         let determinant = dot(x[0], cofactors[0]);
-        // Not so for what is not a number.
-        if !(determinant > REGULAR) {
+        if determinant <= REGULAR || determinant.is_nan() {
             return None;
         }
         let half = 0.5 / determinant;
@@ -249,11 +248,13 @@ pub fn log(r: &Matrix) -> [f64; 3] {
     let [w, x, y, z] = best;
     let length = (x * x + y * y + z * z).sqrt();
     let half = quadrant_angle(length, w.abs());
-    let factor = if length > 1e-150 {
-        2.0 * half / length
+    let tiny = length < 1e-150;
+    let (angle, sine) = if tiny {
+        (2.0, w.abs())
     } else {
-        2.0 / w.abs()
+        (2.0 * half, length)
     };
+    let factor = angle / sine;
     let factor = if w < 0.0 { -factor } else { factor };
     [x * factor, y * factor, z * factor]
 }

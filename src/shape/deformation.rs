@@ -94,22 +94,23 @@ impl Deformation {
             e1.set(lane, sub(b, a));
             e2.set(lane, sub(c, a));
         }
-        let reference = &self.blocks[block];
+        // By value: the compiler does not see that writing to the results leaves the original alone.
+        let reference = self.blocks[block];
         let (mut rotation, mut stretch) = (Lanes::<9>::ZERO, Lanes::<6>::ZERO);
-        let mut flat = [false; LANES];
+        let mut above = Lanes::<1>::ZERO;
         for lane in 0..LANES {
             let (u, v, inverse) = (
                 reference.u.get(lane),
                 reference.v.get(lane),
                 reference.inverse.get(lane),
             );
-            let (r, s, f) = decompose(e1.get(lane), e2.get(lane), u, v, inverse);
+            let (r, s, excess) = decompose(e1.get(lane), e2.get(lane), u, v, inverse);
             rotation.set(lane, r);
             stretch.set(lane, s);
-            flat[lane] = f;
+            above.set(lane, [excess]);
         }
         for lane in 0..faces.len() {
-            if flat[lane]
+            if collapsed(above.get(lane))
                 && let Some(triangle) = &self.triangles[block * LANES + lane]
             {
                 let (r, s) = collinear(e1.get(lane), e2.get(lane), triangle);
@@ -142,7 +143,7 @@ impl Block {
     }
 }
 
-/// R, S and whether there is no normal, in which case R and S mean nothing.
+/// R, S and a number that is positive where the triangle has a normal; where it has none R and S mean nothing.
 #[inline(always)]
 fn decompose(
     e1: Point,
@@ -150,18 +151,19 @@ fn decompose(
     u: Point,
     v: Point,
     [along_u, slant, along_v]: Point,
-) -> ([f64; 9], [f64; 6], bool) {
+) -> ([f64; 9], [f64; 6], f64) {
     let (l1, l2) = (dot(e1, e1), dot(e2, e2));
     // Only what of e2 is across e1, so that the normal of a thin triangle too is orthogonal to both to rounding.
     let normal = cross(e1, along(e2, -dot(e1, e2) / l1, e1));
     let square = dot(normal, normal);
     let twice_area = square.sqrt();
-    let n = normal.map(|x| x / twice_area);
+    let per_area = 1.0 / twice_area;
+    let n = normal.map(|x| x * per_area);
     let j1 = e1.map(|x| x * along_u);
     let j2: Point = std::array::from_fn(|i| e2[i] * along_v - e1[i] * slant);
     let q1 = along(j1, 1.0, cross(j2, n));
-    let size = norm(q1);
-    let q1 = q1.map(|x| x / size);
+    let per_size = 1.0 / norm(q1);
+    let q1 = q1.map(|x| x * per_size);
     let q2 = cross(n, q1);
     let u11 = dot(q1, j1);
     let u22 = dot(q2, j2);
@@ -193,8 +195,12 @@ fn decompose(
             stretch(0, 2),
             stretch(0, 1),
         ],
-        !(square > COLLINEAR * l1 * l2),
+        square - COLLINEAR * (l1 * l2),
     )
+}
+
+fn collapsed([above]: [f64; 1]) -> bool {
+    above <= 0.0 || above.is_nan()
 }
 
 /// R and S of a triangle that is a segment or a point in the frame: T = size a b^T with unit vectors a and b. S = size b b^T; of the rotations that take b
@@ -205,7 +211,7 @@ fn collinear(e1: Point, e2: Point, triangle: &Triangle) -> ([f64; 9], [f64; 6]) 
     let j2: Point = std::array::from_fn(|i| (e2[i] - j1[i] * triangle.foot) / triangle.height);
     let longer = if norm(j1) >= norm(j2) { j1 } else { j2 };
     let length = norm(longer);
-    if !(length > 0.0) {
+    if length == 0.0 {
         return (flatten(IDENTITY), [0.0; 6]);
     }
     let a = longer.map(|x| x / length);

@@ -23,12 +23,14 @@ pub mod vertex;
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::linalg::sparse::FactorError;
+use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
 
 /// Which space.
@@ -162,7 +164,15 @@ pub fn prepare(
     sequence: &Sequence,
     reference: &[f64],
 ) -> Result<Box<dyn Space>, ShapeError> {
-    let connectivity = sequence.connectivity().clone();
+    prepare_alone(kind, sequence.connectivity().clone(), reference)
+}
+
+/// [`prepare`] without a sequence: for spaces that need none.
+pub fn prepare_alone(
+    kind: SpaceKind,
+    connectivity: Arc<Connectivity>,
+    reference: &[f64],
+) -> Result<Box<dyn Space>, ShapeError> {
     Ok(match kind {
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),

@@ -29,8 +29,8 @@ impl Triangle {
         let (e1, e2, e3) = (sub(b, a), sub(c, a), sub(c, b));
         let normal = cross(e1, e2);
         let longest = dot(e1, e1).max(dot(e2, e2)).max(dot(e3, e3));
-        // Degenerate also where this is not a number.
-        if !(norm(normal) > DEGENERATE * longest) {
+        let sound = norm(normal) > DEGENERATE * longest;
+        if !sound {
             return None;
         }
         let length = norm(e1);

@@ -4,11 +4,16 @@ use faer::Mat;
 use thiserror::Error;
 
 use super::Point;
-use crate::linalg::banded::{BAND, BandedLeastSquares};
+use crate::linalg::banded::{BAND, BandedLeastSquares, BandedNormal, Gather};
 use crate::linalg::dense::{FactorError, thin_svd};
+use crate::linalg::kernels::vectorised;
 
 /// Pivots, or singular values, below this share of the largest count as 0: the data leave freedom there.
 const DEFICIENT: f64 = 1e-11;
+/// Pivots of the normal equations that are less than this share of their diagonal are left to rotations.
+const LEAST_PIVOT: f64 = 1e-8;
+/// So is what one step of refinement moves by more than this share.
+const MOST_REFINED: f64 = 1e-8;
 /// Control points this many times farther out than the data.
 const FAR: f64 = 10.0;
 
@@ -81,15 +86,18 @@ impl<'a> Basis<'a> {
         Ok(Self { knots })
     }
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.knots.len() - 2
     }
 
+    #[inline(always)]
     fn domain(&self) -> (f64, f64) {
         (self.knots[2], self.knots[self.count() - 1])
     }
 
     /// Knot i, 1 <= i <= k + 2.
+    #[inline(always)]
     fn knot(&self, i: usize) -> f64 {
         self.knots[i - 1]
     }
@@ -105,6 +113,7 @@ impl<'a> Basis<'a> {
     }
 
     /// The same, looked for from the span before it.
+    #[inline(always)]
     fn span_from(&self, before: usize, u: f64) -> usize {
         let mut s = before;
         while s < self.count() - 1 && u >= self.knot(s + 1) {
@@ -123,27 +132,24 @@ impl<'a> Basis<'a> {
     }
 
     /// Values at u of the four functions that do not vanish on the span s (Cox & de Boor).
+    #[inline(always)]
     fn values_on(&self, s: usize, u: f64) -> Local {
         let (low, high) = self.domain();
         let u = u.clamp(low, high);
         let [t0, t1, t2, t3, t4, t5]: [f64; 6] = std::array::from_fn(|i| self.knots[s - 3 + i]);
-        let share = 1.0 / (t3 - t2);
-        let shares = [(t3 - u) * share / (t3 - t1), (u - t2) * share / (t4 - t2)];
+        let spread = [t3 - t1, t4 - t2, t3 - t0, t4 - t1, t5 - t2, t3 - t2];
+        let [a, b, c, d, e, share] = spread.map(|x| 1.0 / x);
+        let (left, right) = ((t3 - u) * share * a, (u - t2) * share * b);
         let square = [
-            (t3 - u) * shares[0],
-            (u - t1) * shares[0] + (t4 - u) * shares[1],
-            (u - t2) * shares[1],
-        ];
-        let shares = [
-            square[0] / (t3 - t0),
-            square[1] / (t4 - t1),
-            square[2] / (t5 - t2),
+            (t3 - u) * left * c,
+            ((u - t1) * left + (t4 - u) * right) * d,
+            (u - t2) * right * e,
         ];
         let cubic = [
-            (t3 - u) * shares[0],
-            (u - t0) * shares[0] + (t4 - u) * shares[1],
-            (u - t1) * shares[1] + (t5 - u) * shares[2],
-            (u - t2) * shares[2],
+            (t3 - u) * square[0],
+            (u - t0) * square[0] + (t4 - u) * square[1],
+            (u - t1) * square[1] + (t5 - u) * square[2],
+            (u - t2) * square[2],
         ];
         (s - 3, cubic)
     }
@@ -187,9 +193,39 @@ impl<'a> Basis<'a> {
     }
 }
 
+#[inline(always)]
 fn apply(row: &Local, c: &[Point]) -> Point {
     let (first, values) = row;
-    std::array::from_fn(|a| (0..BAND).map(|j| values[j] * c[first + j][a]).sum())
+    let c: &[Point] = &c[*first..first + BAND];
+    std::array::from_fn(|a| (0..BAND).map(|j| values[j] * c[j][a]).sum())
+}
+
+vectorised! {
+    /// The rows of the least squares: the four functions that do not vanish at each parameter.
+    pub fn rows(knots: &[f64], parameters: &[f64]) -> Vec<Local> {
+        let basis = Basis { knots };
+        let mut span = 3;
+        let mut rows = Vec::with_capacity(parameters.len());
+        for &t in parameters {
+            span = basis.span_from(span, t);
+            rows.push(basis.values_on(span, t));
+        }
+        rows
+    }
+}
+
+vectorised! {
+    /// The spline of these control points at each parameter.
+    pub fn values(knots: &[f64], control: &[Point], parameters: &[f64]) -> Vec<Point> {
+        let basis = Basis { knots };
+        let mut span = 3;
+        let mut values = Vec::with_capacity(parameters.len());
+        for &u in parameters {
+            span = basis.span_from(span, u);
+            values.push(apply(&basis.values_on(span, u), control));
+        }
+        values
+    }
 }
 
 impl Spline {
@@ -199,23 +235,31 @@ impl Spline {
     /// is the smoothest one, least in the integral of |f''|^2; at k = n + 2 with the parameters as knots it is the natural spline. Where k does not
     /// exceed it and the matrix is deficient all the same, the solution of least norm. O(n + k) for all but that last case, which takes an SVD.
     pub fn fit(parameters: &[f64], points: &[Point], knots: &[f64]) -> Result<Self, SplineError> {
+        Ok(Self::fit_with_values(parameters, points, knots)?.0)
+    }
+
+    /// [`Spline::fit`], and the spline at the parameters, whose basis functions are at hand.
+    pub fn fit_with_values(
+        parameters: &[f64],
+        points: &[Point],
+        knots: &[f64],
+    ) -> Result<(Self, Vec<Point>), SplineError> {
         let basis = Basis::new(knots)?;
         check_parameters(parameters, points, &basis)?;
-        let mut span = 3;
-        let row = |&t: &f64| {
-            span = basis.span_from(span, t);
-            basis.values_on(span, t)
-        };
-        let rows: Vec<Local> = parameters.iter().map(row).collect();
+        let rows = rows(knots, parameters);
         let freedom = basis.count().saturating_sub(count_distinct(parameters));
-        let control = match banded(&basis, &rows, points, freedom) {
+        let quick = || {
+            (freedom == 0)
+                .then(|| normal(&basis, &rows, points))
+                .flatten()
+        };
+        let control = match quick().or_else(|| banded(&basis, &rows, points, freedom)) {
             Some(control) => control,
             None => dense(&basis, &rows, points, freedom)?,
         };
-        Ok(Self {
-            control,
-            knots: knots.to_vec(),
-        })
+        let values = rows.iter().map(|row| apply(row, &control)).collect();
+        let knots = knots.to_vec();
+        Ok((Self { control, knots }, values))
     }
 
     /// Whether the knots are knots, and two more than the control points.
@@ -230,17 +274,29 @@ impl Spline {
     /// f~(u); beyond the domain the end points hold. Without control points for its knots, or without a domain, the spline is its first control
     /// point. O(log k).
     pub fn evaluate(&self, u: f64) -> Point {
-        let k = self.control.len();
-        if k < BAND || self.knots.len() != k + 2 || self.knots[2] >= self.knots[k - 1] {
-            return self.control.first().copied().unwrap_or([0.0; 2]);
+        match self.basis() {
+            Some(basis) => apply(&basis.values(u), &self.control),
+            None => self.without_domain(),
         }
-        let basis = Basis { knots: &self.knots };
-        apply(&basis.values(u), &self.control)
     }
 
-    /// f~ at many parameters.
+    /// f~ at many parameters; O(1) each where they ascend.
     pub fn evaluate_all(&self, parameters: &[f64]) -> Vec<Point> {
-        parameters.iter().map(|&u| self.evaluate(u)).collect()
+        match self.basis() {
+            Some(_) => values(&self.knots, &self.control, parameters),
+            None => vec![self.without_domain(); parameters.len()],
+        }
+    }
+
+    /// None without control points for the knots, or without a domain.
+    fn basis(&self) -> Option<Basis<'_>> {
+        let k = self.control.len();
+        let whole = k >= BAND && self.knots.len() == k + 2 && self.knots[2] < self.knots[k - 1];
+        whole.then_some(Basis { knots: &self.knots })
+    }
+
+    fn without_domain(&self) -> Point {
+        self.control.first().copied().unwrap_or([0.0; 2])
     }
 }
 
@@ -275,6 +331,37 @@ fn check_parameters(
         }),
         None => Ok(()),
     }
+}
+
+vectorised! {
+    /// Adds A^T (b - A c) to `sum`; c is 0 where there are no control points yet.
+    pub fn add_residuals(rows: &[Local], points: &[Point], control: Option<&[Point]>, sum: &mut [Point]) -> () {
+        let mut gather = Gather::new(sum);
+        for (row, p) in rows.iter().zip(points) {
+            let value = control.map_or([0.0; 2], |c| apply(row, c));
+            let left = [p[0] - value[0], p[1] - value[1]];
+            gather.add(row.0, row.1.map(|weight| left.map(|b| weight * b)));
+        }
+        gather.finish();
+    }
+}
+
+/// The solution by normal equations and one step of refinement; None where the step shows that they are not up to it.
+fn normal(basis: &Basis, rows: &[Local], points: &[Point]) -> Option<Vec<Point>> {
+    let system = BandedNormal::new(basis.count(), rows, LEAST_PIVOT)?;
+    let mut control = vec![[0.0; 2]; basis.count()];
+    add_residuals(rows, points, None, &mut control);
+    system.solve_in_place(&mut control);
+    let mut step = vec![[0.0; 2]; basis.count()];
+    add_residuals(rows, points, Some(&control), &mut step);
+    system.solve_in_place(&mut step);
+    for (c, s) in control.iter_mut().zip(&step) {
+        *c = [c[0] + s[0], c[1] + s[1]];
+    }
+    // Far control points are how deficiency shows that no pivot shows.
+    let sound =
+        reach(&step) <= MOST_REFINED * reach(&control) && reach(&control) <= FAR * reach(points);
+    sound.then_some(control)
 }
 
 /// The banded solution: where there is freedom for one or two more equations, second derivatives at the ends complete the system, and the

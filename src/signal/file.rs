@@ -11,6 +11,7 @@
 //! | `t` | (n) | parameters of the frames |
 //! | `p` | (n, 2) | pose-space positions of the frames |
 //! | `F` | (F, 3) | triangles, 0-based |
+//! | `reference` | (V, 3) | the shape space's reference frame; not in vertex space |
 //! | `meta` | text | JSON: `format`, `space` |
 
 use std::path::Path;
@@ -22,13 +23,15 @@ use thiserror::Error;
 use super::Point;
 use super::f::{Spline, SplineError};
 use super::g::PoseSignal;
+use super::in_space::sample_in_space;
 use super::psi::{Representation, TimeSignal};
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::mesh::{Connectivity, ConnectivityError};
 use crate::sequence::format::{FormatError, npz};
+use crate::shape::reference::check_len;
+use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare_alone};
 
 const FORMAT: &str = "meshseq signal 1";
-const SPACE: &str = "vertex";
 
 /// A representation and the mesh it deforms.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +40,30 @@ pub struct Stored {
     /// p_1 .. p_n, where scaling or the user put the frames.
     pub positions: Vec<Point>,
     pub connectivity: Arc<Connectivity>,
+    /// What the numbers of a frame mean.
+    pub space: SpaceKind,
+    /// The shape space's reference frame, 3V positions; empty in vertex space.
+    pub reference: Vec<f64>,
+}
+
+impl Stored {
+    /// Frames of V vertices at these times, n x 3V positions.
+    pub fn sample(&self, times: &[f64]) -> Result<Vec<f64>, ShapeError> {
+        if self.space == SpaceKind::Vertex {
+            return Ok(self.representation.evaluate(times));
+        }
+        sample_in_space(&*self.prepare()?, &self.representation, times)
+    }
+
+    fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {
+        let space = prepare_alone(self.space, self.connectivity.clone(), &self.reference)?;
+        check_len(
+            "representation",
+            &self.representation.offset,
+            space.dimension(),
+        )?;
+        Ok(space)
+    }
 }
 
 /// Why a file is no representation.
@@ -57,6 +84,9 @@ pub enum RepresentationError {
     /// See [`SplineError`].
     #[error("{path}: `u` and `control` are no time signal: {source}")]
     Spline { path: String, source: SplineError },
+    /// See [`ShapeError`].
+    #[error("{path}: {source}")]
+    Shape { path: String, source: ShapeError },
     /// Arrays that do not fit together.
     #[error("{path}: {what}; expected a representation as `meshseq signal fit` writes it")]
     Inconsistent { path: String, what: String },
@@ -65,9 +95,8 @@ pub enum RepresentationError {
 /// Writes the representation; the file appears whole or not at all.
 pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
     let r = &stored.representation;
-    let faces = stored.connectivity.faces();
-    let meta = serde_json::json!({"format": FORMAT, "space": SPACE}).to_string();
-    let arrays = [
+    let meta = serde_json::json!({"format": FORMAT, "space": stored.space.name()}).to_string();
+    let mut arrays = vec![
         ("h0", Array::vector(&r.offset)),
         ("H", Array::columns(r.basis.as_ref())),
         ("g", Array::columns(r.pose.coefficients.as_ref())),
@@ -76,15 +105,14 @@ pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
         ("u", Array::vector(&r.time.spline.knots)),
         ("t", Array::vector(&r.time.parameters)),
         ("p", Array::points(&stored.positions)),
-        (
-            "F",
-            Array::I64 {
-                shape: vec![faces.len(), 3],
-                data: faces.as_flattened().iter().map(|&v| v.into()).collect(),
-            },
-        ),
+        ("F", Array::triangles(stored.connectivity.faces())),
         ("meta", Array::Text(meta)),
     ];
+    if stored.space != SpaceKind::Vertex {
+        let shape = vec![stored.reference.len() / 3, 3];
+        let data = stored.reference.clone();
+        arrays.push(("reference", Array::F64 { shape, data }));
+    }
     Ok(npz::write_arrays(path, &arrays)?)
 }
 
@@ -104,7 +132,7 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         })?;
     let (representation, positions, meta) = stored;
     let what = mismatch(&representation, &positions)
-        .or_else(|| foreign(&meta))
+        .or_else(|| foreign(&meta).err())
         .or_else(|| {
             bundle
                 .first_not_finite()
@@ -118,18 +146,43 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         path: place.clone(),
         source,
     })?;
-    let connectivity =
-        Connectivity::new(representation.dimension() / 3, faces).map_err(|source| {
-            RepresentationError::Connectivity {
-                path: place,
-                source,
-            }
-        })?;
-    Ok(Stored {
+    let space = foreign(&meta).unwrap_or(SpaceKind::Vertex);
+    let arrays = |source| RepresentationError::Arrays {
+        path: place.clone(),
+        source,
+    };
+    let reference = match space {
+        SpaceKind::Vertex => Vec::new(),
+        _ => bundle.f64("reference", 2).map_err(arrays)?.1.to_vec(),
+    };
+    let numbers = match space {
+        SpaceKind::Vertex => representation.dimension(),
+        _ => reference.len(),
+    };
+    if numbers % 3 != 0 {
+        let what = format!("{numbers} coordinates are no whole number of vertices");
+        return Err(RepresentationError::Inconsistent { path: place, what });
+    }
+    let connectivity = Connectivity::new(numbers / 3, faces);
+    let connectivity = connectivity.map_err(|source| RepresentationError::Connectivity {
+        path: place.clone(),
+        source,
+    })?;
+    let stored = Stored {
         representation,
         positions,
         connectivity: Arc::new(connectivity),
-    })
+        space,
+        reference,
+    };
+    if space != SpaceKind::Vertex {
+        let sound = stored.prepare();
+        sound.map_err(|source| RepresentationError::Shape {
+            path: place,
+            source,
+        })?;
+    }
+    Ok(stored)
 }
 
 fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>, String), ArrayError> {
@@ -181,23 +234,23 @@ fn mismatch(r: &Representation, positions: &[Point]) -> Option<String> {
     if let Some((a, x, b, y)) = pairs.into_iter().find(|(_, x, _, y)| x != y) {
         return Some(format!("{a} is {x} but {b} is {y}"));
     }
-    if d % 3 != 0 || d == 0 || t.is_empty() {
+    if d == 0 || t.is_empty() {
         return Some("it has no vertices or no frames".into());
     }
     let falls = (1..t.len()).find(|&i| t[i] < t[i - 1])?;
     Some(format!("`t` falls at {falls} (0-based)"))
 }
 
-/// What says that the arrays mean something else.
-fn foreign(meta: &str) -> Option<String> {
+/// The space that `meta` names, or what is wrong with it.
+fn foreign(meta: &str) -> Result<SpaceKind, String> {
     let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
-    [("format", FORMAT), ("space", SPACE)]
-        .into_iter()
-        .find(|(key, expected)| meta[key] != *expected)
-        .map(|(key, expected)| {
-            format!(
-                "`meta` has the {key} {}, expected \"{expected}\"",
-                meta[key]
-            )
-        })
+    if meta["format"] != FORMAT {
+        return Err(format!(
+            "`meta` has the format {}, expected \"{FORMAT}\"",
+            meta["format"]
+        ));
+    }
+    let name = meta["space"].as_str().unwrap_or_default();
+    name.parse()
+        .map_err(|unknown: UnknownSpace| format!("`meta`: {unknown}"))
 }

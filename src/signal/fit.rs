@@ -297,9 +297,8 @@ impl Base {
         let x = self.shape.coordinates.as_ref();
         let (pose, rbf) = timed(|| PoseSignal::fit(&self.positions, x, sites));
         let pose = pose?;
-        let (spline, f) = timed(|| self.spline(k, rule));
-        let spline = spline?;
-        let curve = spline.evaluate_all(&self.parameters);
+        let (fitted, f) = timed(|| self.spline(k, rule));
+        let (spline, curve) = fitted?;
         let gap = |(a, b): (&Point, &Point)| super::distance(*a, *b).powi(2);
         let errors = Errors {
             h: self.error_h,
@@ -325,10 +324,14 @@ impl Base {
         })
     }
 
-    fn spline(&self, k: usize, rule: KnotRule) -> Result<Spline, FitError> {
+    fn spline(&self, k: usize, rule: KnotRule) -> Result<(Spline, Vec<Point>), FitError> {
         let t = distinct(&self.parameters);
         let u = knots(&t, k.min(t.len() + 2), rule)?;
-        Ok(Spline::fit(&self.parameters, &self.positions, &u)?)
+        Ok(Spline::fit_with_values(
+            &self.parameters,
+            &self.positions,
+            &u,
+        )?)
     }
 
     pub(super) fn finish(self, attempt: Attempt) -> Fit {

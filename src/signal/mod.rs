@@ -12,6 +12,7 @@
 //! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
 //! text is off, `docs/READINGS.md` says how it is read; "reading r" below is its number r.
@@ -22,6 +23,7 @@ pub mod file;
 pub mod fit;
 pub mod g;
 pub mod h;
+pub mod in_space;
 pub mod knots;
 pub mod mds;
 pub mod parameters;

@@ -1,6 +1,7 @@
 //! The algorithms as named stages: plain arrays in, plain arrays out. `oracles/PROTOCOL.md` gives every stage's arrays.
 
 pub mod sequence;
+pub mod shape;
 pub mod signal;
 
 use std::path::PathBuf;
@@ -48,7 +49,8 @@ impl StageError {
 
 /// Every stage, by system and in the order of the paper.
 pub fn all() -> impl Iterator<Item = &'static Stage> {
-    sequence::STAGES.iter().chain(signal::STAGES)
+    let systems = [sequence::STAGES, shape::STAGES, signal::STAGES];
+    systems.into_iter().flatten()
 }
 
 /// The stage of this name.
@@ -116,15 +118,10 @@ pub fn inputs(
             Ok(Bundle::from([
                 ("A", array(fitted)),
                 ("B", array(sequence.positions().to_vec())),
-                (
-                    "F",
-                    Array::I64 {
-                        shape: vec![faces.len(), 3],
-                        data: faces.as_flattened().iter().map(|&v| v.into()).collect(),
-                    },
-                ),
+                ("F", Array::triangles(faces)),
             ]))
         }
+        _ if stage.starts_with("shape.") => shape::inputs(stage, sequence),
         _ => signal::inputs(stage, frames, choice),
     }
 }

@@ -133,17 +133,18 @@ fn rbf(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let sites = inputs.indices("sites")?;
     let query = inputs.points("query")?;
     same_count("P", points.len(), x.ncols())?;
-    let frames = points.clone();
     call(
-        move || PoseSignal::fit(&points, x.as_ref(), &sites).map_err(StageError::from_error),
-        move |pose| {
+        move || {
+            let pose = PoseSignal::fit(&points, x.as_ref(), &sites);
+            let pose = pose.map_err(StageError::from_error)?;
+            let values = [pose.evaluate(&points), pose.evaluate(&query)];
+            Ok((pose, values))
+        },
+        |(pose, [values, query_values])| {
             Bundle::from([
                 ("g", Array::columns(pose.coefficients.as_ref())),
-                ("values", Array::columns(pose.evaluate(&frames).as_ref())),
-                (
-                    "query_values",
-                    Array::columns(pose.evaluate(&query).as_ref()),
-                ),
+                ("values", Array::columns(values.as_ref())),
+                ("query_values", Array::columns(query_values.as_ref())),
             ])
         },
     )
@@ -195,14 +196,18 @@ fn spline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let u = inputs.vector("u")?.to_vec();
     let points = inputs.points("P")?;
     let query = inputs.vector("query")?.to_vec();
-    let frames = t.clone();
     call(
-        move || Spline::fit(&t, &points, &u).map_err(StageError::from_error),
-        move |spline| {
+        move || {
+            let fitted = Spline::fit_with_values(&t, &points, &u);
+            let (spline, values) = fitted.map_err(StageError::from_error)?;
+            let query_values = spline.evaluate_all(&query);
+            Ok((spline, [values, query_values]))
+        },
+        |(spline, [values, query_values])| {
             Bundle::from([
                 ("control", Array::points(&spline.control)),
-                ("values", Array::points(&spline.evaluate_all(&frames))),
-                ("query_values", Array::points(&spline.evaluate_all(&query))),
+                ("values", Array::points(values)),
+                ("query_values", Array::points(query_values)),
             ])
         },
     )

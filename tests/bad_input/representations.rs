@@ -193,10 +193,15 @@ fn files_of_another_kind() {
         |b| b.put("meta", Array::Text(later.into())),
         &["meshseq signal 2", "meshseq signal 1"],
     );
-    let lengths = r#"{"format": "meshseq signal 1", "space": "lengths"}"#;
+    let unknown = r#"{"format": "meshseq signal 1", "space": "curvature"}"#;
     bad.with(
-        |b| b.put("meta", Array::Text(lengths.into())),
-        &["space", "lengths", "vertex"],
+        |b| b.put("meta", Array::Text(unknown.into())),
+        &["space", "curvature", "vertex"],
+    );
+    let gradient = r#"{"format": "meshseq signal 1", "space": "gradient"}"#;
+    bad.with(
+        |b| b.put("meta", Array::Text(gradient.into())),
+        &["bad.npz", "`reference`", "expected it to be there"],
     );
     bad.refused("good.npz", &["expected", "signal fit"]);
     bad.refused("none.npz", &["no such file"]);

@@ -4,6 +4,7 @@
 
 mod chain;
 mod distance;
+mod encoding;
 mod pipeline;
 mod pose;
 mod scaling;
@@ -30,6 +31,8 @@ fn judge(stage: &str) -> Option<Judge> {
     let (own, against): (Own, Against) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
+        "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
+        "shape.gradient_decode" => (encoding::decoded_own, encoding::decoded_against),
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
         "signal.mds_fixed" => (scaling::fixed_own, scaling::fixed_against),

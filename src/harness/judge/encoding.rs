@@ -1,0 +1,191 @@
+//! Shape spaces: encodings put back together by their formulas, compared up to the branches of their angles; frames decoded beside where they
+//! came from.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::{Measured, diagonal, greatest, shaped, share};
+use crate::arrays::{ArrayError, Bundle};
+
+/// Reference triangles no higher than this over their longest edge, squared, have no gradient (PROTOCOL.md).
+const DEGENERATE: f64 = 1e-10;
+
+/// A frame's vertices.
+type Vertices<'a> = &'a [[f64; 3]];
+
+struct Mesh<'a> {
+    reference: Vertices<'a>,
+    faces: Vec<[u32; 3]>,
+    diagonal: f64,
+}
+
+impl<'a> Mesh<'a> {
+    fn new(inputs: &'a Bundle) -> Result<Self, ArrayError> {
+        let (shape, reference) = inputs.f64("reference", 2)?;
+        shaped(inputs, "reference", &[shape[0], 3])?;
+        Ok(Self {
+            reference: reference.as_chunks().0,
+            faces: inputs.triangles("F")?,
+            diagonal: diagonal(reference, 3),
+        })
+    }
+
+    /// Whether the reference's triangle has a gradient.
+    fn is_sound(&self, face: &[u32; 3]) -> bool {
+        let e = edges(self.reference, face);
+        let longest = [e[0], e[1], e[1] - e[0]].map(|e| e.norm_squared());
+        e[0].cross(&e[1]).norm() > DEGENERATE * longest.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The vertices of each component, by lowest vertex: components are joined by sound triangles.
+    fn components(&self) -> Vec<Vec<usize>> {
+        let mut label: Vec<usize> = (0..self.reference.len()).collect();
+        let sound: Vec<&[u32; 3]> = self.faces.iter().filter(|f| self.is_sound(f)).collect();
+        // Labels sink along triangles until none changes.
+        let mut changed = true;
+        while changed {
+            changed = false;
+            for face in sound.iter().chain(sound.iter().rev()) {
+                let least = face.iter().map(|&v| label[v as usize]).min().unwrap_or(0);
+                for &v in *face {
+                    changed |= label[v as usize] != least;
+                    label[v as usize] = least;
+                }
+            }
+        }
+        let mut components: Vec<Vec<usize>> = vec![Vec::new(); label.len()];
+        for (v, &lowest) in label.iter().enumerate() {
+            components[lowest].push(v);
+        }
+        components.retain(|vertices| !vertices.is_empty());
+        components
+    }
+}
+
+fn edges(vertices: Vertices, face: &[u32; 3]) -> [Vector3<f64>; 2] {
+    let [a, b, c] = face.map(|v| Vector3::from(vertices[v as usize]));
+    [b - a, c - a]
+}
+
+fn rotation(vector: &[f64]) -> Matrix3<f64> {
+    Rotation3::new(Vector3::new(vector[0], vector[1], vector[2])).into_inner()
+}
+
+/// S from S_xx, S_yy, S_zz, sqrt2 S_yz, sqrt2 S_xz, sqrt2 S_xy.
+fn stretch(numbers: &[f64]) -> Matrix3<f64> {
+    let [yz, xz, xy] = [3, 4, 5].map(|i| numbers[i] * 0.5f64.sqrt());
+    let [x, y, z] = [numbers[0], numbers[1], numbers[2]];
+    Matrix3::new(x, xy, xz, xy, y, yz, xz, yz, z)
+}
+
+/// D = [e1 e2 (e1 x e2)/sqrt|e1 x e2|].
+fn frame_matrix(edges: [Vector3<f64>; 2]) -> Matrix3<f64> {
+    let normal = edges[0].cross(&edges[1]);
+    let length = normal.norm();
+    let scaled = if length > 0.0 {
+        normal / length.sqrt()
+    } else {
+        normal
+    };
+    Matrix3::from_columns(&[edges[0], edges[1], scaled])
+}
+
+/// The z of gradient space, row by row, with its frames.
+fn gradient_rows<'a>(
+    inputs: &'a Bundle,
+    outputs: &'a Bundle,
+    mesh: &Mesh,
+    components: usize,
+) -> Result<Vec<(Vertices<'a>, &'a [f64])>, ArrayError> {
+    let vertices = mesh.reference.len();
+    let n = inputs.f64("frames", 3)?.0[0];
+    let frames = shaped(inputs, "frames", &[n, vertices, 3])?;
+    let d = 9 * mesh.faces.len() + 3 * components;
+    let z = shaped(outputs, "z", &[n, d])?;
+    let frames = frames.chunks_exact((3 * vertices).max(1));
+    Ok(frames
+        .map(|f| f.as_chunks().0)
+        .zip(z.chunks_exact(d.max(1)))
+        .collect())
+}
+
+pub fn gradient_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+    let mesh = Mesh::new(inputs)?;
+    let components = mesh.components();
+    let (mut formula, mut negative, mut centres) = (0.0f64, 0.0f64, 0.0f64);
+    for (frame, z) in gradient_rows(inputs, outputs, &mesh, components.len())? {
+        let (triangles, middle) = z.split_at(9 * mesh.faces.len());
+        for (face, numbers) in mesh.faces.iter().zip(triangles.chunks_exact(9)) {
+            let s = stretch(&numbers[3..]);
+            let sound = mesh.is_sound(face);
+            let gap = if sound {
+                let mapped =
+                    rotation(&numbers[..3]) * s * frame_matrix(edges(mesh.reference, face));
+                (mapped - frame_matrix(edges(frame, face))).amax() / mesh.diagonal
+            } else {
+                (rotation(&numbers[..3]) - Matrix3::identity()).amax()
+                    + (s - Matrix3::identity()).amax()
+            };
+            formula = formula.max(gap);
+            negative = negative.max(-s.symmetric_eigenvalues().min() / s.amax().max(1.0));
+        }
+        for (vertices, found) in components.iter().zip(middle.chunks_exact(3)) {
+            let sum: Vector3<f64> = vertices.iter().map(|&v| Vector3::from(frame[v])).sum();
+            let centre = sum / (vertices.len() as f64 * mesh.diagonal);
+            centres = centres.max((centre - Vector3::from_column_slice(found)).amax());
+        }
+    }
+    Ok(vec![
+        ("formula", formula),
+        ("stretch", negative),
+        ("centres", centres),
+    ])
+}
+
+pub fn gradient_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
+    let (shape, a) = ours.f64("z", 2)?;
+    let b = shaped(theirs, "z", shape)?;
+    let triangles = 9 * inputs.triangles("F")?.len();
+    let (mut turned, mut numbers) = (0.0f64, 0.0f64);
+    let rows = a.chunks_exact(shape[1].max(1));
+    for (a, b) in rows.zip(b.chunks_exact(shape[1].max(1))) {
+        let both = a[..triangles]
+            .chunks_exact(9)
+            .zip(b[..triangles].chunks_exact(9));
+        for (a, b) in both {
+            turned = turned.max((rotation(&a[..3]) - rotation(&b[..3])).amax());
+            numbers = numbers.max(greatest(&a[3..], &b[3..]));
+        }
+        numbers = numbers.max(greatest(&a[triangles..], &b[triangles..]));
+    }
+    Ok(vec![
+        ("rotation_difference", turned),
+        ("number_difference", numbers),
+    ])
+}
+
+/// Frames beside the frames that z came from.
+pub fn decoded_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+    let (shape, truth) = inputs.f64("truth", 3)?;
+    let frames = shaped(outputs, "frames", shape)?;
+    Ok(vec![("round_trip", gap(inputs, truth, frames)?)])
+}
+
+pub fn decoded_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
+    let (shape, a) = ours.f64("frames", 3)?;
+    let b = shaped(theirs, "frames", shape)?;
+    Ok(vec![("frame_difference", gap(inputs, a, b)?)])
+}
+
+/// The greatest difference of coordinates over the reference's diagonal.
+fn gap(inputs: &Bundle, a: &[f64], b: &[f64]) -> Result<f64, ArrayError> {
+    let (_, reference) = inputs.f64("reference", 2)?;
+    Ok(share(greatest(a, b), diagonal(reference, 3)))
+}

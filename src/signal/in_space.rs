@@ -1,0 +1,162 @@
+//! Reconstruction in a shape space (section 5): signals are fitted to the vectors z of the frames, and what counts in the end is how far the
+//! vertices are off after decoding.
+
+use faer::{Mat, MatRef};
+use thiserror::Error;
+
+use super::fidelity::fit_to_error;
+use super::fit::{Fit, FitError, FitOptions, fit};
+use super::knots::KnotRule;
+use super::pins::Pin;
+use super::psi::Representation;
+use crate::shape::{Branches, ShapeError, Space, decode_all, encode_all};
+
+/// Fits tried until the vertices are near enough.
+const ATTEMPTS: usize = 12;
+/// Each aims at this share of the error that the one before would need.
+const AIM: f64 = 0.8;
+
+/// A fit in a shape space: errors (2) to (7) are in the units of S, squared.
+#[derive(Clone, Debug)]
+pub struct SpaceFit {
+    pub fit: Fit,
+    /// Root mean square distance of the vertices of psi(i), decoded, from those of frame i.
+    pub rms: f64,
+}
+
+/// Why there is no fit in a shape space.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SpaceFitError {
+    /// See [`ShapeError`].
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// See [`FitError`].
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
+
+/// Fits with these constants to n frames of 3V positions each. Costs encoding, the fit in d dimensions and decoding of n frames.
+pub fn fit_in_space(
+    space: &dyn Space,
+    frames: &[f64],
+    options: &FitOptions,
+) -> Result<SpaceFit, SpaceFitError> {
+    let z = encode_all(space, frames, Branches::Time)?;
+    let fit = fit(z.as_ref(), options)?;
+    let rms = rms_after_decoding(space, frames, &fit.representation)?;
+    Ok(SpaceFit { fit, rms })
+}
+
+/// Chooses k, l and m (section 3.4) so that the vertices are off by at most `rms` after decoding.
+///
+/// The allowed error (2) in S starts at the share of the frames' spread in S that `rms` is of their spread in space, and is then moved by what the
+/// decoded vertices show. The interpolating representation is the last resort.
+pub fn fit_in_space_to_rms(
+    space: &dyn Space,
+    frames: &[f64],
+    rms: f64,
+    knots: KnotRule,
+    pins: &[Pin],
+) -> Result<SpaceFit, SpaceFitError> {
+    if !(rms > 0.0 && rms.is_finite()) {
+        return Err(FitError::BadTolerance { value: rms }.into());
+    }
+    let z = encode_all(space, frames, Branches::Time)?;
+    let n = z.ncols();
+    let given = MatRef::from_column_major_slice(frames, space.frame_len(), n);
+    let allowed = rms * rms * frames.len() as f64 / 3.0;
+    let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
+    for _ in 0..ATTEMPTS {
+        let fit = fit_to_error(z.as_ref(), most.max(f64::MIN_POSITIVE), knots, pins)?;
+        let found = rms_after_decoding(space, frames, &fit.representation)?;
+        if found <= rms {
+            return Ok(SpaceFit { fit, rms: found });
+        }
+        most *= AIM * (rms / found).powi(2);
+    }
+    let options = FitOptions {
+        k: n + 2,
+        l: n,
+        m: n - 1,
+        knots,
+        pins: pins.to_vec(),
+    };
+    let fit = fit(z.as_ref(), &options)?;
+    let rms = rms_after_decoding(space, frames, &fit.representation)?;
+    Ok(SpaceFit { fit, rms })
+}
+
+/// psi at many times as frames of 3V positions, decoded.
+pub fn sample_in_space(
+    space: &dyn Space,
+    representation: &Representation,
+    times: &[f64],
+) -> Result<Vec<f64>, ShapeError> {
+    let z = representation.evaluate(times);
+    let d = representation.dimension();
+    decode_all(space, MatRef::from_column_major_slice(&z, d, times.len()))
+}
+
+fn rms_after_decoding(
+    space: &dyn Space,
+    frames: &[f64],
+    representation: &Representation,
+) -> Result<f64, ShapeError> {
+    let n = representation.time.frame_count();
+    let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+    let decoded = sample_in_space(space, representation, &times)?;
+    let square: f64 = decoded
+        .iter()
+        .zip(frames)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum();
+    Ok((square / (frames.len() as f64 / 3.0)).sqrt())
+}
+
+/// Sum of squared distances of the columns from their mean.
+fn spread(z: MatRef<'_, f64>) -> f64 {
+    let n = z.ncols() as f64;
+    let mean: Mat<f64> = Mat::from_fn(z.nrows(), 1, |a, _| z.row(a).iter().sum::<f64>() / n);
+    let column = |i: usize| {
+        let pairs = z.col(i).iter().zip(mean.col(0).iter());
+        pairs.map(|(x, mean)| (x - mean).powi(2)).sum::<f64>()
+    };
+    (0..z.ncols()).map(column).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::dataset::open;
+    use crate::shape::{SpaceKind, prepare};
+
+    #[test]
+    fn interpolating_signals_in_gradient_space_give_the_frames_back() {
+        let sequence = open("@gallop-small").unwrap();
+        let n = sequence.frame_count();
+        let space = prepare(SpaceKind::Gradient, &sequence, sequence.frame(0)).unwrap();
+        let options = FitOptions {
+            k: n + 2,
+            l: n,
+            m: n - 1,
+            knots: KnotRule::Symmetric,
+            pins: Vec::new(),
+        };
+        let found = fit_in_space(&*space, sequence.positions(), &options).unwrap();
+        assert!(found.rms < 1e-9, "{}", found.rms);
+    }
+
+    #[test]
+    fn the_tolerance_is_one_of_vertices() {
+        let sequence = open("@gallop-small").unwrap();
+        let space = prepare(SpaceKind::Gradient, &sequence, sequence.frame(0)).unwrap();
+        let symmetric = KnotRule::Symmetric;
+        let fit = |rms| fit_in_space_to_rms(&*space, sequence.positions(), rms, symmetric, &[]);
+        let (fine, coarse) = (fit(0.005).unwrap(), fit(0.05).unwrap());
+        assert!(fine.rms <= 0.005 && coarse.rms <= 0.05);
+        assert!(
+            coarse.fit.representation.stored_numbers() < fine.fit.representation.stored_numbers()
+        );
+        assert!(fit(0.0).is_err() && fit(f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,107 @@
+//! The stages of shape spaces (Cashman & Hormann 2012, section 5): frames to vectors and back.
+
+use faer::MatRef;
+
+use super::{Call, Stage, StageError, call};
+use crate::arrays::{Array, Bundle};
+use crate::mesh::Connectivity;
+use crate::sequence::Sequence;
+use crate::shape::{Branches, Space, SpaceKind, decode_all, encode_all, prepare, prepare_alone};
+
+/// By space, encoding before decoding.
+pub static STAGES: &[Stage] = &[
+    Stage {
+        name: "shape.gradient_encode",
+        about: "deformation gradients: rotation vectors and stretches of every triangle (section 5; Sumner & Popovic 2004)",
+        prepare: |inputs| encode(SpaceKind::Gradient, inputs),
+    },
+    Stage {
+        name: "shape.gradient_decode",
+        about: "frames from deformation gradients by one Poisson factorisation (section 5)",
+        prepare: |inputs| decode(SpaceKind::Gradient, inputs),
+    },
+];
+
+/// Preparing the space (its reference, its factors) is not part of the work.
+fn encode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let space = space(kind, inputs)?;
+    let (shape, frames) = inputs.f64("frames", 3)?;
+    let vertices = space.frame_len() / 3;
+    if shape[1..] != [vertices, 3] {
+        return Err(StageError::Failed(format!(
+            "`frames` has shape {shape:?}, expected (n, {vertices}, 3)"
+        )));
+    }
+    let frames = frames.to_vec();
+    call(
+        move || encode_all(&*space, &frames, Branches::Time).map_err(StageError::from_error),
+        |z| Bundle::from([("z", Array::columns(z.as_ref()))]),
+    )
+}
+
+fn decode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let space = space(kind, inputs)?;
+    let z = inputs.matrix("z")?;
+    if z.nrows() != space.dimension() {
+        return Err(StageError::Failed(format!(
+            "`z` has {} numbers a frame, expected d = {}",
+            z.nrows(),
+            space.dimension()
+        )));
+    }
+    let shape = vec![z.ncols(), space.frame_len() / 3, 3];
+    call(
+        move || decode_all(&*space, z.as_ref()).map_err(StageError::from_error),
+        move |frames| {
+            let data = frames.clone();
+            let shape = shape.clone();
+            Bundle::from([("frames", Array::F64 { shape, data })])
+        },
+    )
+}
+
+/// The space over the bundle's `reference` and `F`.
+fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
+    let (shape, reference) = inputs.f64("reference", 2)?;
+    if shape[1] != 3 {
+        return Err(StageError::Failed(format!(
+            "`reference` has shape {shape:?}, expected (V, 3)"
+        )));
+    }
+    let connectivity =
+        Connectivity::new(shape[0], inputs.triangles("F")?).map_err(StageError::from_error)?;
+    prepare_alone(kind, connectivity.into(), reference).map_err(StageError::from_error)
+}
+
+/// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
+/// `truth`, which only judges read.
+pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
+    let (n, d) = (sequence.frame_count(), sequence.dimension());
+    let faces = sequence.connectivity().faces();
+    let reference = Array::F64 {
+        shape: vec![d / 3, 3],
+        data: sequence.frame(0).to_vec(),
+    };
+    let frames = Array::F64 {
+        shape: vec![n, d / 3, 3],
+        data: sequence.positions().to_vec(),
+    };
+    let mut inputs = Bundle::from([("reference", reference), ("F", Array::triangles(faces))]);
+    let Some((name, direction)) = stage
+        .strip_prefix("shape.")
+        .and_then(|rest| rest.rsplit_once('_'))
+    else {
+        return Err(StageError::Failed(format!("there is no stage `{stage}`")));
+    };
+    let kind: SpaceKind = name.parse().map_err(StageError::from_error)?;
+    if direction == "encode" {
+        inputs.put("frames", frames);
+        return Ok(inputs);
+    }
+    let space = prepare(kind, sequence, sequence.frame(0)).map_err(StageError::from_error)?;
+    let z = encode_all(&*space, sequence.positions(), Branches::Time);
+    let z = z.map_err(StageError::from_error)?;
+    inputs.put("z", Array::columns(MatRef::from(z.as_ref())));
+    inputs.put("truth", frames);
+    Ok(inputs)
+}
