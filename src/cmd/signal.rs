@@ -64,7 +64,7 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// Shape space: vertex or gradient
+    /// Shape space: vertex, gradient or lric
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given
@@ -190,7 +190,7 @@ impl FitVerb {
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
             return Ok(SpaceFit { fit, rms });
         }
-        let prepared = prepare(space, sequence, reference)?;
+        let prepared = prepare(space, sequence.connectivity().clone(), reference)?;
         let frames = sequence.positions();
         Ok(match &constants {
             Some(options) => fit_in_space(&*prepared, frames, options)?,

@@ -61,6 +61,22 @@ faults! {
         });
     "poisson-wrong-frame" in "shape.gradient_decode": "the first two frames swapped",
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "lric-relative" in "shape.lric_encode": "every number a millionth too large",
+        Outputs(|_, out| numbers(out, "z", stretch));
+    "lric-inside-out" in "shape.lric_encode": "the surface bent the other way: the sign of every angle",
+        Outputs(|inputs, out| {
+            let edges = crate::mesh::topology::Topology::new(&inputs.triangles("F").unwrap_or_default()).fans().count();
+            let d = row_length(out, "z");
+            numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[..3 * edges].chunks_mut(3).for_each(|e| e[2] = -e[2])));
+        });
+    "lric-turn-dropped" in "shape.lric_encode": "components without their rotation",
+        Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
+    "lric-bend-dropped" in "shape.lric_decode": "the first edge of the last frame left flat",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| { let at = z.len() - d; z[at + 2] += 0.1 }) });
+    "lric-wrong-frame" in "shape.lric_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
     "h-sign" in "signal.h": "first direction and its coordinates negated",
         Outputs(|inputs, out| {
             let d = row_length(inputs, "Z");

@@ -48,6 +48,18 @@ tolerances! {
         "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
         "frame_difference" <= 1e-11, "the same Poisson equation by another factorisation, over the diagonal";
     }
+    "shape.lric_encode" {
+        "first_form" <= 1e-12, "U times the reference's edges have the frame's lengths, over the diagonal";
+        "second_form" <= 1e-10, "radians; normals of slivers: eps over the ratio of height to length, 1e-3 on real meshes";
+        "placement" <= 1e-12, "the root triangle is mapped onto the frame's, centres are means";
+        "form_difference" <= 1e-10, "as gradients: slivers";
+        "angle_difference" <= 1e-10, "as second_form";
+        "placement_difference" <= 1e-10, "as gradients";
+    }
+    "shape.lric_decode" {
+        "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
+        "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
+    }
     "signal.h" {
         "mean" <= 1e-14, "a mean of n frames";
         "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";

@@ -162,34 +162,3 @@ pub(super) fn stretched([xx, yy, zz, yz, xz, xy]: [f64; 6], [x, y, z]: [f64; 3])
         xz * x + yz * y + zz * z,
     ]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sequence::synthetic::embedded;
-    use crate::shape::{Branches, decode_all, encode_all};
-
-    #[test]
-    fn embedded_sequences_come_back() {
-        for name in [
-            "@bar-small",
-            "@roll-small",
-            "@flag-small",
-            "@gallop-small",
-            "@jelly-small",
-        ] {
-            let sequence = embedded(name).unwrap();
-            let space =
-                GradientSpace::new(sequence.connectivity().clone(), sequence.frame(0)).unwrap();
-            let z = encode_all(&space, sequence.positions(), Branches::Time).unwrap();
-            let frames = decode_all(&space, z.as_ref()).unwrap();
-            let worst = frames
-                .iter()
-                .zip(sequence.positions())
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
-            println!("{name}: {:e}", worst / space.reference.diagonal);
-            assert!(worst < 1e-11 * space.reference.diagonal, "{name}: {worst}");
-        }
-    }
-}

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | [`vertex`] | 3V | positions |
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
+//! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
 
 mod deformation;
 pub mod frames;
@@ -19,6 +20,8 @@ mod pool;
 pub mod posed;
 pub mod reference;
 pub mod surface;
+#[cfg(test)]
+mod tests;
 pub mod vertex;
 
 use std::fmt;
@@ -31,7 +34,6 @@ use thiserror::Error;
 
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
-use crate::sequence::Sequence;
 
 /// Which space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -42,21 +44,11 @@ pub enum SpaceKind {
     Gradient,
     /// Linear rotation-invariant coordinates (Lipman et al. 2005).
     Lric,
-    /// Edge lengths and dihedral angles (Winkler et al. 2010; Froehlich & Botsch 2011).
-    Lengths,
-    /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
-    Patch,
 }
 
 impl SpaceKind {
     /// Every space, in the order of the paper.
-    pub const ALL: [Self; 5] = [
-        Self::Vertex,
-        Self::Gradient,
-        Self::Lric,
-        Self::Lengths,
-        Self::Patch,
-    ];
+    pub const ALL: [Self; 3] = [Self::Vertex, Self::Gradient, Self::Lric];
 
     /// Its name on the command line and in stages.
     pub fn name(self) -> &'static str {
@@ -64,8 +56,6 @@ impl SpaceKind {
             Self::Vertex => "vertex",
             Self::Gradient => "gradient",
             Self::Lric => "lric",
-            Self::Lengths => "lengths",
-            Self::Patch => "patch",
         }
     }
 }
@@ -78,7 +68,7 @@ impl fmt::Display for SpaceKind {
 
 /// A name that no space has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no shape space `{0}`; there are vertex, gradient, lric, lengths and patch")]
+#[error("there is no shape space `{0}`; there are vertex, gradient and lric")]
 pub struct UnknownSpace(String);
 
 impl FromStr for SpaceKind {
@@ -109,9 +99,6 @@ pub enum ShapeError {
     /// See [`FactorError`].
     #[error("the equations of the reference frame cannot be solved: {0}")]
     Factor(#[from] FactorError),
-    /// A space that is not there yet.
-    #[error("there is no {kind} space yet")]
-    Unavailable { kind: SpaceKind },
     /// What is wrong with one of several frames.
     #[error("frame {frame} (1-based): {source}")]
     Frame {
@@ -142,33 +129,10 @@ pub trait Space: Send + Sync {
 
     /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
     fn unwrap(&self, _previous: &[f64], _z: &mut [f64]) {}
-
-    /// Chooses the branches of the angles in `z` so that neighbours on the surface differ little. Nothing where there are no angles.
-    fn unwrap_surface(&self, _z: &mut [f64]) {}
 }
 
-/// How the branches of angles are chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Branches {
-    /// Over the surface in the first frame, then nearest to the frame before: for motions.
-    #[default]
-    Time,
-    /// Over the surface in every frame: for poses that have little to do with each other.
-    Surface,
-}
-
-/// Prepares a space over the connectivity of `sequence` and a reference frame of 3V positions. The sequence's frames matter to the patch space
-/// alone, which finds its patches from them.
+/// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.
 pub fn prepare(
-    kind: SpaceKind,
-    sequence: &Sequence,
-    reference: &[f64],
-) -> Result<Box<dyn Space>, ShapeError> {
-    prepare_alone(kind, sequence.connectivity().clone(), reference)
-}
-
-/// [`prepare`] without a sequence: for spaces that need none.
-pub fn prepare_alone(
     kind: SpaceKind,
     connectivity: Arc<Connectivity>,
     reference: &[f64],
@@ -176,19 +140,13 @@ pub fn prepare_alone(
     Ok(match kind {
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
-        SpaceKind::Lric | SpaceKind::Lengths | SpaceKind::Patch => {
-            return Err(ShapeError::Unavailable { kind });
-        }
+        SpaceKind::Lric => Box::new(lric::LricSpace::new(connectivity, reference)?),
     })
 }
 
 /// The vectors of n frames (n x 3V positions, frame after frame) as the columns of a d x n matrix. Frames run in parallel, then branches are
 /// chosen; the result does not depend on the number of threads.
-pub fn encode_all(
-    space: &dyn Space,
-    frames: &[f64],
-    branches: Branches,
-) -> Result<Mat<f64>, ShapeError> {
+pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let len = space.frame_len().max(1);
     let n = frames.len() / len;
     reference::check_len("frames", frames, n * len)?;
@@ -199,18 +157,13 @@ pub fn encode_all(
         .filter_map(|column| column.try_as_col_major_mut());
     let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
     let both = columns.par_iter_mut().zip(frames.par_chunks_exact(len));
-    first_error(both.enumerate().map(|(i, (z, frame))| {
-        space.encode(frame, z).map_err(|e| e.of_frame(i))?;
-        if branches == Branches::Surface || i == 0 {
-            space.unwrap_surface(z);
-        }
-        Ok(())
-    }))?;
-    if branches == Branches::Time {
-        for i in 1..n {
-            let (before, after) = columns.split_at_mut(i);
-            space.unwrap(before[i - 1], after[0]);
-        }
+    first_error(
+        both.enumerate()
+            .map(|(i, (z, frame))| space.encode(frame, z).map_err(|e| e.of_frame(i))),
+    )?;
+    for i in 1..n {
+        let (before, after) = columns.split_at_mut(i);
+        space.unwrap(before[i - 1], after[0]);
     }
     Ok(z)
 }

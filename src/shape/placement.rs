@@ -3,9 +3,7 @@
 
 use super::posed::{posed, rest_axes};
 use super::reference::{Reference, Triangle};
-use crate::linalg::rotation::{
-    Matrix, apply, exp, log, nearest_branch, times_transposed,
-};
+use crate::linalg::rotation::{Matrix, apply, exp, log, nearest_branch, times_transposed};
 use crate::mesh::vector::point;
 
 /// Numbers of a component.
@@ -68,7 +66,6 @@ pub fn unwrap(previous: &[f64], z: &mut [f64]) {
         ));
     }
 }
-
 
 fn rotations_of(reference: &Reference, positions: &[f64]) -> impl Iterator<Item = Option<Matrix>> {
     (0..reference.components.len()).map(|component| {

@@ -29,7 +29,7 @@ use crate::arrays::{Array, ArrayError, Bundle};
 use crate::mesh::{Connectivity, ConnectivityError};
 use crate::sequence::format::{FormatError, npz};
 use crate::shape::reference::check_len;
-use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare_alone};
+use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare};
 
 const FORMAT: &str = "meshseq signal 1";
 
@@ -56,7 +56,7 @@ impl Stored {
     }
 
     fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {
-        let space = prepare_alone(self.space, self.connectivity.clone(), &self.reference)?;
+        let space = prepare(self.space, self.connectivity.clone(), &self.reference)?;
         check_len(
             "representation",
             &self.representation.offset,

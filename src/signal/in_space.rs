@@ -9,7 +9,7 @@ use super::fit::{Fit, FitError, FitOptions, fit};
 use super::knots::KnotRule;
 use super::pins::Pin;
 use super::psi::Representation;
-use crate::shape::{Branches, ShapeError, Space, decode_all, encode_all};
+use crate::shape::{ShapeError, Space, decode_all, encode_all};
 
 /// Fits tried until the vertices are near enough.
 const ATTEMPTS: usize = 12;
@@ -41,7 +41,7 @@ pub fn fit_in_space(
     frames: &[f64],
     options: &FitOptions,
 ) -> Result<SpaceFit, SpaceFitError> {
-    let z = encode_all(space, frames, Branches::Time)?;
+    let z = encode_all(space, frames)?;
     let fit = fit(z.as_ref(), options)?;
     let rms = rms_after_decoding(space, frames, &fit.representation)?;
     Ok(SpaceFit { fit, rms })
@@ -61,7 +61,7 @@ pub fn fit_in_space_to_rms(
     if !(rms > 0.0 && rms.is_finite()) {
         return Err(FitError::BadTolerance { value: rms }.into());
     }
-    let z = encode_all(space, frames, Branches::Time)?;
+    let z = encode_all(space, frames)?;
     let n = z.ncols();
     let given = MatRef::from_column_major_slice(frames, space.frame_len(), n);
     let allowed = rms * rms * frames.len() as f64 / 3.0;
@@ -134,7 +134,12 @@ mod tests {
     fn interpolating_signals_in_gradient_space_give_the_frames_back() {
         let sequence = open("@gallop-small").unwrap();
         let n = sequence.frame_count();
-        let space = prepare(SpaceKind::Gradient, &sequence, sequence.frame(0)).unwrap();
+        let space = prepare(
+            SpaceKind::Gradient,
+            sequence.connectivity().clone(),
+            sequence.frame(0),
+        )
+        .unwrap();
         let options = FitOptions {
             k: n + 2,
             l: n,
@@ -149,7 +154,12 @@ mod tests {
     #[test]
     fn the_tolerance_is_one_of_vertices() {
         let sequence = open("@gallop-small").unwrap();
-        let space = prepare(SpaceKind::Gradient, &sequence, sequence.frame(0)).unwrap();
+        let space = prepare(
+            SpaceKind::Gradient,
+            sequence.connectivity().clone(),
+            sequence.frame(0),
+        )
+        .unwrap();
         let symmetric = KnotRule::Symmetric;
         let fit = |rms| fit_in_space_to_rms(&*space, sequence.positions(), rms, symmetric, &[]);
         let (fine, coarse) = (fit(0.005).unwrap(), fit(0.05).unwrap());

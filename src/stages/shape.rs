@@ -6,7 +6,7 @@ use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::shape::{Branches, Space, SpaceKind, decode_all, encode_all, prepare, prepare_alone};
+use crate::shape::{Space, SpaceKind, decode_all, encode_all, prepare};
 
 /// By space, encoding before decoding.
 pub static STAGES: &[Stage] = &[
@@ -19,6 +19,16 @@ pub static STAGES: &[Stage] = &[
         name: "shape.gradient_decode",
         about: "frames from deformation gradients by one Poisson factorisation (section 5)",
         prepare: |inputs| decode(SpaceKind::Gradient, inputs),
+    },
+    Stage {
+        name: "shape.lric_encode",
+        about: "rotation-invariant coordinates: stretches of triangles, dihedral angles of edges (section 5; after Lipman et al. 2005)",
+        prepare: |inputs| encode(SpaceKind::Lric, inputs),
+    },
+    Stage {
+        name: "shape.lric_decode",
+        about: "frames from rotation-invariant coordinates by two sparse systems (section 5)",
+        prepare: |inputs| decode(SpaceKind::Lric, inputs),
     },
 ];
 
@@ -34,7 +44,7 @@ fn encode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError>
     }
     let frames = frames.to_vec();
     call(
-        move || encode_all(&*space, &frames, Branches::Time).map_err(StageError::from_error),
+        move || encode_all(&*space, &frames).map_err(StageError::from_error),
         |z| Bundle::from([("z", Array::columns(z.as_ref()))]),
     )
 }
@@ -70,7 +80,7 @@ fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError>
     }
     let connectivity =
         Connectivity::new(shape[0], inputs.triangles("F")?).map_err(StageError::from_error)?;
-    prepare_alone(kind, connectivity.into(), reference).map_err(StageError::from_error)
+    prepare(kind, connectivity.into(), reference).map_err(StageError::from_error)
 }
 
 /// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
@@ -98,8 +108,9 @@ pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
         inputs.put("frames", frames);
         return Ok(inputs);
     }
-    let space = prepare(kind, sequence, sequence.frame(0)).map_err(StageError::from_error)?;
-    let z = encode_all(&*space, sequence.positions(), Branches::Time);
+    let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0))
+        .map_err(StageError::from_error)?;
+    let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
     inputs.put("z", Array::columns(MatRef::from(z.as_ref())));
     inputs.put("truth", frames);

@@ -10,16 +10,16 @@ use crate::arrays::{ArrayError, Bundle};
 const DEGENERATE: f64 = 1e-10;
 
 /// A frame's vertices.
-type Vertices<'a> = &'a [[f64; 3]];
+pub(super) type Vertices<'a> = &'a [[f64; 3]];
 
-struct Mesh<'a> {
-    reference: Vertices<'a>,
-    faces: Vec<[u32; 3]>,
-    diagonal: f64,
+pub(super) struct Mesh<'a> {
+    pub reference: Vertices<'a>,
+    pub faces: Vec<[u32; 3]>,
+    pub diagonal: f64,
 }
 
 impl<'a> Mesh<'a> {
-    fn new(inputs: &'a Bundle) -> Result<Self, ArrayError> {
+    pub fn new(inputs: &'a Bundle) -> Result<Self, ArrayError> {
         let (shape, reference) = inputs.f64("reference", 2)?;
         shaped(inputs, "reference", &[shape[0], 3])?;
         Ok(Self {
@@ -30,14 +30,37 @@ impl<'a> Mesh<'a> {
     }
 
     /// Whether the reference's triangle has a gradient.
-    fn is_sound(&self, face: &[u32; 3]) -> bool {
+    pub fn is_sound(&self, face: &[u32; 3]) -> bool {
         let e = edges(self.reference, face);
         let longest = [e[0], e[1], e[1] - e[0]].map(|e| e.norm_squared());
         e[0].cross(&e[1]).norm() > DEGENERATE * longest.into_iter().fold(0.0, f64::max)
     }
 
+    /// Rows of d numbers of an encoding, with their frames.
+    pub fn rows<'b>(
+        &self,
+        inputs: &'b Bundle,
+        outputs: &'b Bundle,
+        d: usize,
+    ) -> Result<Vec<(Vertices<'b>, &'b [f64])>, ArrayError> {
+        let vertices = self.reference.len();
+        let n = inputs.f64("frames", 3)?.0[0];
+        let frames = shaped(inputs, "frames", &[n, vertices, 3])?;
+        let z = shaped(outputs, "z", &[n, d])?;
+        let frames = frames.chunks_exact((3 * vertices).max(1));
+        let frames = frames.map(|f| f.as_chunks().0);
+        Ok(frames.zip(z.chunks_exact(d.max(1))).collect())
+    }
+
+    /// How far three numbers are from the mean of these vertices over the diagonal.
+    pub fn centre_gap(&self, frame: Vertices, vertices: &[usize], found: &[f64]) -> f64 {
+        let sum: Vector3<f64> = vertices.iter().map(|&v| Vector3::from(frame[v])).sum();
+        let centre = sum / (vertices.len() as f64 * self.diagonal);
+        (centre - Vector3::from_column_slice(found)).amax()
+    }
+
     /// The vertices of each component, by lowest vertex: components are joined by sound triangles.
-    fn components(&self) -> Vec<Vec<usize>> {
+    pub fn components(&self) -> Vec<Vec<usize>> {
         let mut label: Vec<usize> = (0..self.reference.len()).collect();
         let sound: Vec<&[u32; 3]> = self.faces.iter().filter(|f| self.is_sound(f)).collect();
         // Labels sink along triangles until none changes.
@@ -61,12 +84,12 @@ impl<'a> Mesh<'a> {
     }
 }
 
-fn edges(vertices: Vertices, face: &[u32; 3]) -> [Vector3<f64>; 2] {
+pub(super) fn edges(vertices: Vertices, face: &[u32; 3]) -> [Vector3<f64>; 2] {
     let [a, b, c] = face.map(|v| Vector3::from(vertices[v as usize]));
     [b - a, c - a]
 }
 
-fn rotation(vector: &[f64]) -> Matrix3<f64> {
+pub(super) fn rotation(vector: &[f64]) -> Matrix3<f64> {
     Rotation3::new(Vector3::new(vector[0], vector[1], vector[2])).into_inner()
 }
 
@@ -89,30 +112,12 @@ fn frame_matrix(edges: [Vector3<f64>; 2]) -> Matrix3<f64> {
     Matrix3::from_columns(&[edges[0], edges[1], scaled])
 }
 
-/// The z of gradient space, row by row, with its frames.
-fn gradient_rows<'a>(
-    inputs: &'a Bundle,
-    outputs: &'a Bundle,
-    mesh: &Mesh,
-    components: usize,
-) -> Result<Vec<(Vertices<'a>, &'a [f64])>, ArrayError> {
-    let vertices = mesh.reference.len();
-    let n = inputs.f64("frames", 3)?.0[0];
-    let frames = shaped(inputs, "frames", &[n, vertices, 3])?;
-    let d = 9 * mesh.faces.len() + 3 * components;
-    let z = shaped(outputs, "z", &[n, d])?;
-    let frames = frames.chunks_exact((3 * vertices).max(1));
-    Ok(frames
-        .map(|f| f.as_chunks().0)
-        .zip(z.chunks_exact(d.max(1)))
-        .collect())
-}
-
 pub fn gradient_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
     let components = mesh.components();
     let (mut formula, mut negative, mut centres) = (0.0f64, 0.0f64, 0.0f64);
-    for (frame, z) in gradient_rows(inputs, outputs, &mesh, components.len())? {
+    let d = 9 * mesh.faces.len() + 3 * components.len();
+    for (frame, z) in mesh.rows(inputs, outputs, d)? {
         let (triangles, middle) = z.split_at(9 * mesh.faces.len());
         for (face, numbers) in mesh.faces.iter().zip(triangles.chunks_exact(9)) {
             let s = stretch(&numbers[3..]);
@@ -129,9 +134,7 @@ pub fn gradient_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, 
             negative = negative.max(-s.symmetric_eigenvalues().min() / s.amax().max(1.0));
         }
         for (vertices, found) in components.iter().zip(middle.chunks_exact(3)) {
-            let sum: Vector3<f64> = vertices.iter().map(|&v| Vector3::from(frame[v])).sum();
-            let centre = sum / (vertices.len() as f64 * mesh.diagonal);
-            centres = centres.max((centre - Vector3::from_column_slice(found)).amax());
+            centres = centres.max(mesh.centre_gap(frame, vertices, found));
         }
     }
     Ok(vec![

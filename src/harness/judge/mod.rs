@@ -5,6 +5,7 @@
 mod chain;
 mod distance;
 mod encoding;
+mod forms;
 mod pipeline;
 mod pose;
 mod scaling;
@@ -32,7 +33,10 @@ fn judge(stage: &str) -> Option<Judge> {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
-        "shape.gradient_decode" => (encoding::decoded_own, encoding::decoded_against),
+        "shape.lric_encode" => (forms::own, forms::against),
+        "shape.gradient_decode" | "shape.lric_decode" => {
+            (encoding::decoded_own, encoding::decoded_against)
+        }
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
         "signal.mds_fixed" => (scaling::fixed_own, scaling::fixed_against),

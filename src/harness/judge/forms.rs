@@ -1,0 +1,209 @@
+//! The first and second form of the `lric` space, put back together by their formulas.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{SQRT_2, TAU};
+
+use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
+
+use super::encoding::{Mesh, Vertices, edges, rotation};
+use super::{Measured, shaped};
+use crate::arrays::{ArrayError, Bundle};
+
+/// Where the numbers of a mesh are in z.
+struct Layout {
+    /// Of each triangle's half-edges (a,b), (b,c), (c,a).
+    halves: Vec<[usize; 3]>,
+    /// Pairs: triangles f and g, the edge as f runs along it, whether g runs the same way, and the place of their angle.
+    pairs: Vec<PairPlace>,
+    /// Where the six numbers of the first component are.
+    components: usize,
+}
+
+struct PairPlace {
+    triangles: [usize; 2],
+    edge: [u32; 2],
+    same_way: bool,
+    place: usize,
+}
+
+impl Layout {
+    fn new(faces: &[[u32; 3]]) -> Self {
+        // Half-edges of each edge, in the order of their triangles; a side from a vertex to itself is none.
+        let mut fans: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
+        for (f, face) in faces.iter().enumerate() {
+            for corner in 0..3 {
+                let [a, b] = [face[corner], face[(corner + 1) % 3]];
+                if a != b {
+                    fans.entry([a.min(b), a.max(b)])
+                        .or_default()
+                        .push((f, corner));
+                }
+            }
+        }
+        let mut layout = Self {
+            halves: vec![[usize::MAX; 3]; faces.len()],
+            pairs: Vec::new(),
+            components: 0,
+        };
+        for fan in fans.values() {
+            let start = layout.components;
+            for (i, &(f, corner)) in fan.iter().enumerate() {
+                layout.halves[f][corner] = start + i;
+            }
+            let side =
+                |&(f, corner): &(usize, usize)| [faces[f][corner], faces[f][(corner + 1) % 3]];
+            for (i, other) in fan[1..].iter().enumerate() {
+                layout.pairs.push(PairPlace {
+                    triangles: [fan[0].0, other.0],
+                    edge: side(&fan[0]),
+                    same_way: side(&fan[0]) == side(other),
+                    place: start + fan.len() + i,
+                });
+            }
+            layout.components += (2 * fan.len() - 1).max(3);
+        }
+        layout
+    }
+}
+
+/// The edges of a reference triangle in its plane, first axis along e1.
+fn in_plane(e: [Vector3<f64>; 2]) -> Matrix2<f64> {
+    let first = e[0].normalize();
+    let second = e[0].cross(&e[1]).cross(&e[0]).normalize();
+    Matrix2::new(e[0].dot(&first), e[1].dot(&first), 0.0, e[1].dot(&second))
+}
+
+/// The reference triangle's axes in space, 3 x 2.
+fn axes(e: [Vector3<f64>; 2]) -> Matrix3x2<f64> {
+    let second = e[0].cross(&e[1]).cross(&e[0]).normalize();
+    Matrix3x2::from_columns(&[e[0].normalize(), second])
+}
+
+fn form(z: &[f64], halves: &[usize; 3]) -> Matrix2<f64> {
+    let [xx, yy, xy] = halves.map(|place| z.get(place).copied().unwrap_or(f64::NAN));
+    Matrix2::new(xx, xy / SQRT_2, xy / SQRT_2, yy)
+}
+
+/// How far the triangle's three sides, mapped by U, are from the lengths in the frame.
+fn length_gap(u: Matrix2<f64>, rest: Matrix2<f64>, now: [Vector3<f64>; 2]) -> f64 {
+    let mapped = u * rest;
+    let [a, b]: [Vector2<f64>; 2] = [mapped.column(0).into(), mapped.column(1).into()];
+    let gaps = [
+        a.norm() - now[0].norm(),
+        b.norm() - now[1].norm(),
+        (b - a).norm() - (now[1] - now[0]).norm(),
+    ];
+    gaps.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+fn dihedral(frame: Vertices, faces: &[[u32; 3]], pair: &PairPlace) -> f64 {
+    let normal = |f: usize| {
+        let [a, b] = edges(frame, &faces[f]);
+        a.cross(&b).normalize()
+    };
+    let [f, mut g] = pair.triangles.map(normal);
+    if pair.same_way {
+        g = -g;
+    }
+    let [a, b] = pair.edge.map(|v| Vector3::from(frame[v as usize]));
+    f.cross(&g).dot(&(b - a).normalize()).atan2(f.dot(&g))
+}
+
+/// The distance of two angles modulo 2 pi.
+fn turn_gap(a: f64, b: f64) -> f64 {
+    let gap = (a - b).abs() % TAU;
+    gap.min(TAU - gap)
+}
+
+pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+    let mesh = Mesh::new(inputs)?;
+    let layout = Layout::new(&mesh.faces);
+    let components = mesh.components();
+    let d = layout.components + 6 * components.len();
+    let (mut lengths, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
+    for (frame, z) in mesh.rows(inputs, outputs, d)? {
+        for (face, halves) in mesh.faces.iter().zip(&layout.halves) {
+            let u = form(z, halves);
+            lengths = lengths.max(match mesh.is_sound(face) {
+                true => {
+                    let rest = in_plane(edges(mesh.reference, face));
+                    length_gap(u, rest, edges(frame, face)) / mesh.diagonal
+                }
+                false if halves.contains(&usize::MAX) => 0.0,
+                false => (u - Matrix2::identity()).amax(),
+            });
+        }
+        for pair in &layout.pairs {
+            let sound = pair
+                .triangles
+                .iter()
+                .all(|&f| mesh.is_sound(&mesh.faces[f]));
+            let expected = if sound {
+                dihedral(frame, &mesh.faces, pair)
+            } else {
+                0.0
+            };
+            angles = angles.max(turn_gap(z[pair.place], expected));
+        }
+        for (vertices, numbers) in components
+            .iter()
+            .zip(z[layout.components..].chunks_exact(6))
+        {
+            let found = &numbers[3..];
+            placed = placed.max(mesh.centre_gap(frame, vertices, found));
+            let inside = |f: &&[u32; 3]| mesh.is_sound(f) && vertices.contains(&(f[0] as usize));
+            let root = mesh.faces.iter().position(|f| inside(&f));
+            placed = placed.max(match root {
+                Some(f) => {
+                    let rest = edges(mesh.reference, &mesh.faces[f]);
+                    let u = form(z, &layout.halves[f]);
+                    let now = edges(frame, &mesh.faces[f]);
+                    let mapped = rotation(&numbers[..3]) * axes(rest) * u * in_plane(rest);
+                    (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
+                }
+                None => numbers[..3].iter().map(|x| x.abs()).fold(0.0, f64::max),
+            });
+        }
+    }
+    Ok(vec![
+        ("first_form", lengths),
+        ("second_form", angles),
+        ("placement", placed),
+    ])
+}
+
+pub fn against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
+    let (shape, a) = ours.f64("z", 2)?;
+    let b = shaped(theirs, "z", shape)?;
+    let mesh = Mesh::new(inputs)?;
+    let layout = Layout::new(&mesh.faces);
+    let mut is_angle = vec![false; layout.components];
+    layout
+        .pairs
+        .iter()
+        .for_each(|pair| is_angle[pair.place] = true);
+    let (mut forms, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
+    let rows = a.chunks_exact(shape[1].max(1));
+    for (a, b) in rows.zip(b.chunks_exact(shape[1].max(1))) {
+        for (i, &angle) in is_angle.iter().enumerate() {
+            match angle {
+                true => angles = angles.max(turn_gap(a[i], b[i])),
+                false => forms = forms.max((a[i] - b[i]).abs()),
+            }
+        }
+        let parts = a[layout.components..].chunks_exact(6);
+        for (a, b) in parts.zip(b[layout.components..].chunks_exact(6)) {
+            placed = placed.max((rotation(&a[..3]) - rotation(&b[..3])).amax());
+            placed = placed.max(super::greatest(&a[3..], &b[3..]));
+        }
+    }
+    Ok(vec![
+        ("form_difference", forms),
+        ("angle_difference", angles),
+        ("placement_difference", placed),
+    ])
+}

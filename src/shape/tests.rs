@@ -1,0 +1,237 @@
+//! What every space promises: frames come back, rigid motions touch what they must, odd meshes follow the rules, large turns interpolate.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{Rotation3, Vector3};
+use proptest::prelude::*;
+
+use super::{Space, SpaceKind, decode_all, encode_all, prepare};
+use crate::mesh::Connectivity;
+use crate::mesh::measure::bounds;
+use crate::sequence::synthetic::embedded;
+use crate::sequence::synthetic::roll::{SMALL, roll_strip};
+
+const KINDS: [SpaceKind; 2] = [SpaceKind::Gradient, SpaceKind::Lric];
+
+fn space(
+    kind: SpaceKind,
+    vertices: usize,
+    faces: &[[u32; 3]],
+    reference: &[f64],
+) -> Box<dyn Space> {
+    let connectivity = Connectivity::new(vertices, faces.to_vec()).unwrap();
+    prepare(kind, Arc::new(connectivity), reference).unwrap()
+}
+
+fn flat(points: &[Vector3<f64>]) -> Vec<f64> {
+    points.iter().flat_map(|p| [p.x, p.y, p.z]).collect()
+}
+
+fn moved(frame: &[f64], turn: &Rotation3<f64>, by: Vector3<f64>) -> Vec<f64> {
+    let points = frame.as_chunks::<3>().0.iter();
+    flat(
+        &points
+            .map(|&p| turn * Vector3::from(p) + by)
+            .collect::<Vec<_>>(),
+    )
+}
+
+fn worst(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}
+
+/// The greatest distance of a frame from what decoding its vector gives.
+fn round_trip(space: &dyn Space, frame: &[f64]) -> f64 {
+    let z = encode_all(space, frame).unwrap();
+    worst(frame, &decode_all(space, z.as_ref()).unwrap())
+}
+
+#[test]
+fn embedded_sequences_come_back() {
+    for name in [
+        "@bar-small",
+        "@roll-small",
+        "@flag-small",
+        "@gallop-small",
+        "@jelly-small",
+    ] {
+        let sequence = embedded(name).unwrap();
+        let size = bounds(sequence.frame(0)).diagonal();
+        for kind in KINDS {
+            let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0)).unwrap();
+            let z = encode_all(&*space, sequence.positions()).unwrap();
+            let found = worst(
+                sequence.positions(),
+                &decode_all(&*space, z.as_ref()).unwrap(),
+            );
+            assert!(found < 1e-12 * size, "{name} {kind}: {found}");
+        }
+    }
+}
+
+/// Three pages at one edge, a triangle apart from them, a vertex of no triangle, and a triangle of no area along a page's side.
+fn odd() -> (Vec<[u32; 3]>, Vec<f64>) {
+    let points = [
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.5, 0.0],
+        [-0.7, 0.4, 0.6],
+        [-0.5, 0.5, -0.8],
+        [3.0, 0.0, 0.0],
+        [4.0, 0.0, 0.2],
+        [3.0, 1.0, 0.1],
+        [9.0, 9.0, 9.0],
+        [0.0, 0.5, 0.0],
+    ];
+    let faces = vec![
+        [0, 1, 2],
+        [0, 1, 3],
+        [1, 0, 4],
+        [5, 6, 7],
+        [0, 9, 1],
+        [9, 2, 0],
+    ];
+    (faces, points.as_flattened().to_vec())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn odd_meshes_come_back(jitter in prop::collection::vec(-0.2f64..0.2, 30)) {
+        let (faces, reference) = odd();
+        let frame: Vec<f64> = reference.iter().zip(&jitter).map(|(x, j)| x + j).collect();
+        for kind in KINDS {
+            let space = space(kind, 10, &faces, &reference);
+            // Three components; [0, 9, 1] has no area and no say, so only what its neighbours hold comes back.
+            let found = round_trip(&*space, &frame);
+            prop_assert!(found < 1e-12, "{kind}: {found}");
+        }
+    }
+
+    #[test]
+    fn rigid_motions_touch_only_what_they_must(
+        axis in prop::array::uniform3(-1.0f64..1.0), by in prop::array::uniform3(-5.0f64..5.0), pick in 0usize..24,
+    ) {
+        let sequence = embedded("@gallop-small").unwrap();
+        let (reference, frame) = (sequence.frame(0), sequence.frame(pick));
+        let turn = Rotation3::new(Vector3::from(axis) * 1.2);
+        let other = moved(frame, &turn, Vector3::from(by));
+        let faces = sequence.connectivity().faces();
+        for kind in KINDS {
+            let space = space(kind, reference.len() / 3, faces, reference);
+            let both = [frame, &other].map(|f| encode_all(&*space, f).unwrap());
+            let [a, b] = [0, 1].map(|i| both[i].col_as_slice(0));
+            match kind {
+                SpaceKind::Gradient => {
+                    let triangles = 9 * faces.len();
+                    for (a, b) in a[..triangles].chunks(9).zip(b[..triangles].chunks(9)) {
+                        prop_assert!(worst(&a[3..], &b[3..]) < 1e-12);
+                        let [p, q] = [a, b].map(|z| Rotation3::new(Vector3::new(z[0], z[1], z[2])));
+                        prop_assert!(((turn * p).matrix() - q.matrix()).amax() < 1e-12);
+                    }
+                }
+                _ => {
+                    let edges = a.len() - 6;
+                    let gap = a[..edges].iter().zip(&b[..edges]).map(|(a, b)| {
+                        let gap = (a - b).abs();
+                        gap.min((TAU - gap).abs())
+                    });
+                    prop_assert!(gap.fold(0.0, f64::max) < 1e-11);
+                    let [p, q] = [a, b].map(|z| Rotation3::new(Vector3::from_column_slice(&z[edges..edges + 3])));
+                    prop_assert!(((turn * p).matrix() - q.matrix()).amax() < 1e-11);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_moebius_band_comes_back() {
+    let n = 24;
+    let band = |width: f64| -> Vec<f64> {
+        let rung = |i: usize| {
+            let a = TAU * i as f64 / n as f64;
+            let (sin, cos) = (a / 2.0).sin_cos();
+            [-width, width].map(|w| {
+                let r = 2.0 + w * cos;
+                Vector3::new(r * a.cos(), r * a.sin(), w * sin)
+            })
+        };
+        flat(&(0..n).flat_map(rung).collect::<Vec<_>>())
+    };
+    let mut faces = Vec::new();
+    for i in 0..n as u32 {
+        let (a, b) = (2 * i, 2 * i + 1);
+        // The last rung meets the first upside down.
+        let (c, d) = if i + 1 < n as u32 {
+            (a + 2, b + 2)
+        } else {
+            (1, 0)
+        };
+        faces.extend([[a, c, b], [b, c, d]]);
+    }
+    for kind in KINDS {
+        let space = space(kind, 2 * n, &faces, &band(0.5));
+        let found = round_trip(&*space, &band(0.8));
+        assert!(found < 1e-12, "{kind}: {found}");
+    }
+}
+
+/// A strip rolled by an angle, halfway to flat, is the strip rolled by half of it: its angles are known, and its lengths do not change.
+#[test]
+fn lric_rolls_by_half() {
+    let flat_strip = flat(&roll_strip(0.0, &SMALL));
+    let roll = embedded("@roll-small").unwrap();
+    let size = bounds(&flat_strip).diagonal();
+    let space = prepare(SpaceKind::Lric, roll.connectivity().clone(), &flat_strip).unwrap();
+    for degrees in [90.0f64, 170.0, 350.0, 700.0] {
+        let angle = degrees.to_radians();
+        let frames = [flat_strip.clone(), flat(&roll_strip(angle, &SMALL))].concat();
+        let z = encode_all(&*space, &frames).unwrap();
+        let half: Vec<f64> = (0..z.nrows())
+            .map(|a| 0.5 * (z[(a, 0)] + z[(a, 1)]))
+            .collect();
+        let mut found = vec![0.0; flat_strip.len()];
+        space.decode(&half, &mut found).unwrap();
+        let expected = flat(&roll_strip(angle / 2.0, &SMALL));
+        // Up to a rigid motion: compare distances of all vertices from a few.
+        let distances = |x: &[f64]| -> Vec<f64> {
+            let points: Vec<Vector3<f64>> =
+                x.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
+            let picks = [0, points.len() / 3, points.len() / 2, points.len() - 1];
+            picks
+                .iter()
+                .flat_map(|&i| points.iter().map(move |p| (p, i)))
+                .map(|(p, i)| (p - points[i]).norm())
+                .collect()
+        };
+        let gap = worst(&distances(&found), &distances(&expected));
+        assert!(gap < 1e-9 * size, "{degrees}: {gap}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let (faces, reference) = odd();
+    for kind in KINDS {
+        let space = space(kind, 10, &faces, &reference);
+        let mut z = vec![0.0; space.dimension()];
+        assert!(space.encode(&reference[3..], &mut z).is_err());
+        assert!(space.encode(&reference, &mut z[1..]).is_err());
+        let mut frame = reference.clone();
+        frame[4] = f64::NAN;
+        assert!(space.encode(&frame, &mut z).is_err());
+        z[2] = f64::INFINITY;
+        assert!(space.decode(&z, &mut frame).is_err());
+        // Any finite vector gives a finite frame.
+        z.fill(3.7);
+        space.decode(&z, &mut frame).unwrap();
+        assert!(frame.iter().all(|x| x.is_finite()));
+    }
+}
