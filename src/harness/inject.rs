@@ -54,11 +54,7 @@ faults! {
     "poisson-weights" in "shape.gradient_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
     "poisson-triangle-dropped" in "shape.gradient_decode": "the first triangle of the last frame as in the reference",
-        Inputs(|inputs| {
-            let d = row_length(inputs, "z");
-            let still = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
-            numbers(inputs, "z", |z| { let at = z.len() - d; z[at..at + 9].copy_from_slice(&still) });
-        });
+        Inputs(|inputs| last_frame(inputs, |z| z[..9].copy_from_slice(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])));
     "poisson-wrong-frame" in "shape.gradient_decode": "the first two frames swapped",
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-relative" in "shape.lric_encode": "every number a millionth too large",
@@ -71,8 +67,8 @@ faults! {
         });
     "lric-turn-dropped" in "shape.lric_encode": "components without their rotation",
         Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
-    "lric-bend-dropped" in "shape.lric_decode": "the first edge of the last frame left flat",
-        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| { let at = z.len() - d; z[at + 2] += 0.1 }) });
+    "lric-bent" in "shape.lric_decode": "the edges of the last frame bent a millionth more",
+        Inputs(|inputs| last_frame(inputs, |z| { let edges = z.len() / 3 - 2; z[..3 * edges].chunks_mut(3).for_each(|e| e[2] *= 1.0 + SLIGHT) }));
     "lric-wrong-frame" in "shape.lric_decode": "the first two frames swapped",
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
@@ -212,6 +208,15 @@ fn each_triangle(inputs: &Bundle, out: &mut Bundle, change: impl Fn(&mut [f64]))
         let rows = z.chunks_mut(d);
         rows.for_each(|row| row[..9 * triangles].chunks_mut(9).for_each(&change));
     });
+}
+
+/// The vector, among those to decode, of the last frame that is known.
+fn last_frame(inputs: &mut Bundle, change: impl FnOnce(&mut [f64])) {
+    let (d, n) = (
+        row_length(inputs, "z"),
+        inputs.f64("truth", 3).map_or(1, |(shape, _)| shape[0]),
+    );
+    numbers(inputs, "z", |z| change(&mut z[(n - 1) * d..n * d]));
 }
 
 /// Drops the last row of an array.

@@ -4,10 +4,9 @@
 //! each is then replaced by its nearest rotation (after Lipman et al. 2005, whose frames these are). The rows of R decouple: 3 unknowns a member, three
 //! right-hand sides.
 //!
-//! The C enter that system's matrix, which would have to be factored for every frame. Instead the C are multiplied along a tree of pairs to rotations Q, and
-//! with R = X Q the equations become X_g = X_f H with H = Q_f C_fg Q_g^T: the identity along the tree, and everywhere where the C are consistent, so that
-//! X = I is the answer already. What is left is found by conjugate gradients, preconditioned by the system for H = I: a graph's Laplacian of 1 unknown a
-//! member, which depends on the pairs alone and is factored once.
+//! The C are first multiplied along a tree of pairs to rotations Q. With R = X Q the equations become X_g = X_f H with H = Q_f C_fg Q_g^T: the identity along
+//! the tree, and everywhere where the C are consistent, as those of a frame are; X = I is the answer then. Otherwise the normal equations of X, 3 unknowns
+//! a member and a pattern that depends on the pairs alone, are factored and refined once, so that their condition costs no accuracy.
 
 use super::ShapeError;
 use super::pool::Pool;
@@ -15,8 +14,10 @@ use crate::linalg::rotation::{IDENTITY, Matrix, nearest_rotation, times, times_t
 use crate::linalg::sparse::{Factor, Pattern};
 use crate::mesh::topology::linked;
 
-/// Conjugate gradients stop where the preconditioned residual, which is about the error that is left, is below this in every entry of X.
-const TOLERANCE: f64 = 1e-13;
+/// Pairs whose H are off the identity by no more are consistent: that much is rounding in thin triangles.
+const CONSISTENT: f64 = 1e-12;
+/// Solutions of the normal equations, each for what the ones before have left.
+const SOLUTIONS: usize = 2;
 
 /// The pairs of a set of members, prepared.
 #[derive(Debug)]
@@ -26,7 +27,7 @@ pub struct Frames {
     tree: Vec<Step>,
     /// Of every member; that of roots is one past the last.
     unknowns: Vec<u32>,
-    laplacian: Factor,
+    equations: Pattern,
     work: Pool<Work>,
 }
 
@@ -42,37 +43,41 @@ struct Step {
 struct Work {
     /// H of every pair.
     loops: Vec<Matrix>,
-    /// Of every unknown, and one more that stands for all roots.
+    /// X of every unknown, and one more that stands for all roots.
     x: Vec<Matrix>,
     residual: Vec<Matrix>,
-    preconditioned: Vec<Matrix>,
-    direction: Vec<Matrix>,
-    image: Vec<Matrix>,
-    column: Vec<[f64; 3]>,
+    values: Vec<f64>,
+    factor: Option<Factor>,
     scratch: Vec<[f64; 4]>,
 }
 
 impl Frames {
-    /// Prepares for pairs of different members, numbered from 0 and below `count`. Costs a sparse factorisation.
+    /// Prepares for pairs of different members, numbered from 0 and below `count`. Costs the analysis of a sparse
+    /// system.
     pub fn new(count: usize, pairs: Vec<[u32; 2]>) -> Result<Self, ShapeError> {
         let (labels, parts) = linked(count, pairs.iter().copied());
         let mut roots = Vec::with_capacity(parts);
         let mut unknowns = vec![(count - parts) as u32; count];
-        let mut free = 0..;
+        let mut next = 0..;
         for (member, &label) in labels.iter().enumerate() {
             if label as usize == roots.len() {
                 roots.push(member as u32);
-            } else if let Some(unknown) = free.next() {
+            } else if let Some(unknown) = next.next() {
                 unknowns[member] = unknown;
             }
         }
-        let laplacian = laplacian(count - parts, &pairs, &unknowns)?;
+        let free = count - parts;
+        let places: Vec<[u32; 2]> = pairs
+            .iter()
+            .flat_map(|&pair| pair_coefficients(free, pair, &unknowns))
+            .map(|(place, _)| place)
+            .collect();
         Ok(Self {
+            equations: Pattern::new(3 * free, &places)?,
             tree: tree(count, &pairs, &roots),
             pairs,
             roots,
             unknowns,
-            laplacian,
             work: Pool::default(),
         })
     }
@@ -82,11 +87,11 @@ impl Frames {
         &self.roots
     }
 
-    /// Fills in the rotation of every member, given those of the roots in `rotations` and the relative rotations, one a pair. Returns the number of
-    /// steps of conjugate gradients: 0 for consistent ones.
+    /// Fills in the rotation of every member, given those of the roots in `rotations` and the relative rotations, one a pair.
     ///
-    /// Consistent rotations come back to rounding. O(P) and three triangular solves a step.
-    pub fn solve(&self, relative: &[Matrix], rotations: &mut [Matrix]) -> usize {
+    /// Consistent rotations come back to rounding in O(P); others cost a sparse factorisation. An error where numbers beyond all bounds leave
+    /// nothing to factor.
+    pub fn solve(&self, relative: &[Matrix], rotations: &mut [Matrix]) -> Result<(), ShapeError> {
         self.follow_tree(relative, rotations);
         self.work.lend(|work| {
             work.loops.clear();
@@ -94,13 +99,15 @@ impl Frames {
             let both = self.pairs.iter().map(ends).zip(relative);
             work.loops
                 .extend(both.map(|((f, g), c)| times_transposed(&times(f, c), g)));
-            let steps = self.conjugate_gradients(work);
-            for (rotation, &unknown) in rotations.iter_mut().zip(&self.unknowns) {
-                if (unknown as usize) < self.laplacian.size() {
-                    *rotation = nearest_rotation(&times(&work.x[unknown as usize], rotation));
-                }
+            if work.loops.iter().all(is_consistent) {
+                return Ok(());
             }
-            steps
+            self.least_squares(work)?;
+            for (rotation, &unknown) in rotations.iter_mut().zip(&self.unknowns) {
+                // That of roots is the identity.
+                *rotation = nearest_rotation(&times(&work.x[unknown as usize], rotation));
+            }
+            Ok(())
         })
     }
 
@@ -115,58 +122,31 @@ impl Frames {
         }
     }
 
-    /// Solves for X, from X = I; the rows of X are systems of their own and have their own step lengths.
-    fn conjugate_gradients(&self, work: &mut Work) -> usize {
-        let n = self.laplacian.size();
-        let fields = [
-            &mut work.x,
-            &mut work.residual,
-            &mut work.preconditioned,
-            &mut work.direction,
-            &mut work.image,
-        ];
-        for field in fields {
-            field.clear();
-            field.resize(n + 1, [[0.0; 3]; 3]);
+    /// X from X = I. A matrix is its columns, so that a list of them, flattened, is the unknowns with the rows of X side by side.
+    fn least_squares(&self, work: &mut Work) -> Result<(), ShapeError> {
+        let n = self.equations.size() / 3;
+        work.values.clear();
+        for (pair, h) in self.pairs.iter().zip(&work.loops) {
+            let values = pair_coefficients(n, *pair, &self.unknowns).map(|(_, value)| value.of(h));
+            work.values.extend(values);
         }
-        work.x.fill(IDENTITY);
-        self.multiply(&work.loops, &work.x, &mut work.residual);
-        for r in work.residual.as_flattened_mut().as_flattened_mut() {
-            *r = -*r;
+        match &mut work.factor {
+            Some(factor) => factor.refactor(&work.values)?,
+            none => *none = Some(self.equations.factor(&work.values)?),
         }
-        let mut before = [1.0; 3];
-        for step in 0.. {
-            let error = self.precondition(work);
-            if error <= TOLERANCE {
-                add(&mut work.x, [1.0; 3], &work.preconditioned);
-                return step;
+        work.x.clear();
+        work.x.resize(n + 1, IDENTITY);
+        work.residual.resize(n + 1, IDENTITY);
+        for _ in 0..SOLUTIONS {
+            self.multiply(&work.loops, &work.x, &mut work.residual);
+            if let Some(factor) = &work.factor {
+                factor.solve3(work.residual[..n].as_flattened_mut(), &mut work.scratch);
             }
-            let product = inner(&work.residual, &work.preconditioned);
-            let ratio: [f64; 3] = std::array::from_fn(|i| product[i] / before[i]);
-            for (p, z) in work.direction.iter_mut().zip(&work.preconditioned) {
-                for j in 0..3 {
-                    for i in 0..3 {
-                        p[j][i] = z[j][i] + ratio[i] * p[j][i];
-                    }
-                }
-            }
-            self.multiply(&work.loops, &work.direction, &mut work.image);
-            let energy = inner(&work.direction, &work.image);
-            let length = std::array::from_fn(|i| {
-                if energy[i] > 0.0 {
-                    product[i] / energy[i]
-                } else {
-                    0.0
-                }
-            });
-            add(&mut work.x, length, &work.direction);
-            add(&mut work.residual, length.map(|l| -l), &work.image);
-            before = product.map(|p| if p > 0.0 { p } else { 1.0 });
-            if step > 20000 {
-                return step;
-            }
+            let steps = work.residual[..n].as_flattened().as_flattened();
+            let x = work.x[..n].as_flattened_mut().as_flattened_mut();
+            x.iter_mut().zip(steps).for_each(|(x, step)| *x -= step);
         }
-        0
+        Ok(())
     }
 
     /// Half the derivative of sum |X_g - X_f H|^2 by the unknowns.
@@ -186,46 +166,48 @@ impl Frames {
             }
         }
         // Roots stay.
-        out[self.laplacian.size()] = [[0.0; 3]; 3];
-    }
-
-    /// Solves with the Laplacian; the largest entry of the result.
-    fn precondition(&self, work: &mut Work) -> f64 {
-        let n = self.laplacian.size();
-        let mut largest = 0.0f64;
-        for j in 0..3 {
-            work.column.clear();
-            work.column.extend(work.residual[..n].iter().map(|r| r[j]));
-            self.laplacian.solve3(&mut work.column, &mut work.scratch);
-            for (z, solved) in work.preconditioned.iter_mut().zip(&work.column) {
-                z[j] = *solved;
-                largest = solved.iter().fold(largest, |most, x| most.max(x.abs()));
-            }
-        }
-        largest
+        out[self.equations.size() / 3] = [[0.0; 3]; 3];
     }
 }
 
-/// y += a x, row by row.
-fn add(y: &mut [Matrix], a: [f64; 3], x: &[Matrix]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        for j in 0..3 {
-            for i in 0..3 {
-                y[j][i] += a[i] * x[j][i];
-            }
+fn is_consistent(h: &Matrix) -> bool {
+    let gaps = h.as_flattened().iter().zip(IDENTITY.as_flattened());
+    gaps.fold(true, |near, (a, b)| near & ((a - b).abs() <= CONSISTENT))
+}
+
+/// A coefficient of the normal equations, as H of its pair makes it.
+enum Coefficient {
+    One,
+    /// -H[j][k].
+    Minus([usize; 2]),
+}
+
+impl Coefficient {
+    fn of(&self, h: &Matrix) -> f64 {
+        match *self {
+            Self::One => 1.0,
+            Self::Minus([j, k]) => -h[j][k],
         }
     }
 }
 
-/// The inner products of the rows.
-fn inner(x: &[Matrix], y: &[Matrix]) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for (x, y) in x.iter().zip(y) {
-        for i in 0..3 {
-            sums[i] += (x[0][i] * y[0][i] + x[1][i] * y[1][i]) + x[2][i] * y[2][i];
-        }
-    }
-    sums
+/// What a pair adds to the normal equations, and where: H is a rotation, so that both diagonal blocks are identities.
+fn pair_coefficients(
+    free: usize,
+    pair: [u32; 2],
+    unknowns: &[u32],
+) -> impl Iterator<Item = ([u32; 2], Coefficient)> {
+    let [f, g] = pair.map(|m| unknowns[m as usize]);
+    let is_free = move |u: &u32| (*u as usize) < free;
+    let diagonal = [f, g].into_iter().filter(is_free);
+    let diagonal = diagonal.flat_map(|u| (0..3).map(move |j| ([3 * u + j; 2], Coefficient::One)));
+    let both = is_free(&f) && is_free(&g);
+    let across = (0..9).filter(move |_| both).map(move |i| {
+        let [j, k] = [i / 3, i % 3];
+        let place = [3 * g + j as u32, 3 * f + k as u32];
+        (place, Coefficient::Minus([j, k]))
+    });
+    diagonal.chain(across)
 }
 
 /// Breadth first, so that paths are short and their errors small.
@@ -276,16 +258,76 @@ fn tree(count: usize, pairs: &[[u32; 2]], roots: &[u32]) -> Vec<Step> {
     tree
 }
 
-fn laplacian(n: usize, pairs: &[[u32; 2]], unknowns: &[u32]) -> Result<Factor, ShapeError> {
-    let (mut entries, mut values) = (Vec::new(), Vec::new());
-    for pair in pairs {
-        let [f, g] = pair.map(|m| unknowns[m as usize]);
-        for (entry, value) in [([f, f], 1.0), ([g, g], 1.0), ([f, g], -1.0)] {
-            if entry.iter().all(|&i| (i as usize) < n) {
-                entries.push(entry);
-                values.push(value);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::rotation::exp;
+    use nalgebra::{DMatrix, Matrix3};
+    use proptest::prelude::*;
+
+    /// Two triangles of pairs with a bridge, and a member by itself.
+    const PAIRS: [[u32; 2]; 8] = [
+        [0, 1],
+        [1, 2],
+        [0, 2],
+        [2, 3],
+        [3, 4],
+        [4, 5],
+        [3, 5],
+        [1, 4],
+    ];
+
+    fn plain(m: &Matrix) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| m[j][i])
+    }
+
+    /// The normal equations of the whole system, root held, by a dense factorisation.
+    fn dense(relative: &[Matrix], root: &Matrix) -> Vec<Matrix> {
+        let mut system = DMatrix::zeros(3 * PAIRS.len(), 15);
+        let mut right = DMatrix::zeros(3 * PAIRS.len(), 3);
+        for (row, ([f, g], c)) in PAIRS.iter().zip(relative).enumerate() {
+            // Transposed: R_g^T - C^T R_f^T.
+            let c = plain(c).transpose();
+            let root = plain(root).transpose();
+            for (member, block) in [(*g, Matrix3::identity()), (*f, -c)] {
+                match member {
+                    0 => right
+                        .view_mut((3 * row, 0), (3, 3))
+                        .copy_from(&(-(block * root))),
+                    m => system
+                        .view_mut((3 * row, 3 * (m as usize - 1)), (3, 3))
+                        .copy_from(&block),
+                }
+            }
+        }
+        let x = (system.transpose() * &system)
+            .cholesky()
+            .unwrap()
+            .solve(&(system.transpose() * right));
+        let block = |m: usize| -> Matrix {
+            std::array::from_fn(|j| std::array::from_fn(|i| x[(3 * m + j, i)]))
+        };
+        (0..5).map(|m| nearest_rotation(&block(m))).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn rotations_that_disagree_are_the_least_squares(vectors in prop::collection::vec(prop::array::uniform3(-0.6f64..0.6), 9)) {
+            let frames = Frames::new(7, PAIRS.to_vec()).unwrap();
+            prop_assert_eq!(frames.roots(), [0, 6]);
+            let relative: Vec<Matrix> = vectors[..8].iter().map(|&v| exp(v)).collect();
+            let mut found = vec![exp(vectors[8]); 7];
+            frames.solve(&relative, &mut found).unwrap();
+            for (found, expected) in found[1..].iter().zip(dense(&relative, &exp(vectors[8]))) {
+                prop_assert!((plain(found) - plain(&expected)).amax() < 1e-10);
             }
         }
     }
-    Ok(Pattern::new(n, &entries)?.factor(&values)?)
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        let frames = Frames::new(7, PAIRS.to_vec()).unwrap();
+        let refused = frames.solve(&[[[f64::NAN; 3]; 3]; 8], &mut [IDENTITY; 7]);
+        assert!(matches!(refused, Err(ShapeError::Factor(_))), "{refused:?}");
+    }
 }

@@ -65,28 +65,6 @@ impl LricSpace {
             work: Pool::default(),
         })
     }
-
-    /// [`Space::decode`], and the steps that it took to find the rotations: 0 where the numbers are those of a frame.
-    pub fn decode_counting(&self, z: &[f64], positions: &mut [f64]) -> Result<usize, ShapeError> {
-        check("z", z, self.dimension())?;
-        check_len("frame", positions, self.frame_len())?;
-        let (edges, placed) = z.split_at(self.edge_numbers);
-        let number = |slot: u32, missing: f64| edges.get(slot as usize).copied().unwrap_or(missing);
-        Ok(self.work.lend(|stretch| {
-            let forms = self.halves.iter().map(|&[uu, vv, uv]| {
-                [
-                    number(uu, 1.0),
-                    number(vv, 1.0),
-                    FRAC_1_SQRT_2 * number(uv, 0.0),
-                ]
-            });
-            stretch.clear();
-            stretch.extend(forms);
-            let angle = |hinge: usize| edges[self.angles[hinge] as usize];
-            self.surface
-                .solve(&self.reference, stretch, angle, placed, positions)
-        }))
-    }
 }
 
 impl Space for LricSpace {
@@ -127,7 +105,24 @@ impl Space for LricSpace {
     }
 
     fn decode(&self, z: &[f64], positions: &mut [f64]) -> Result<(), ShapeError> {
-        self.decode_counting(z, positions).map(drop)
+        check("z", z, self.dimension())?;
+        check_len("frame", positions, self.frame_len())?;
+        let (edges, placed) = z.split_at(self.edge_numbers);
+        let number = |slot: u32, missing: f64| edges.get(slot as usize).copied().unwrap_or(missing);
+        self.work.lend(|stretch| {
+            let forms = self.halves.iter().map(|&[uu, vv, uv]| {
+                [
+                    number(uu, 1.0),
+                    number(vv, 1.0),
+                    FRAC_1_SQRT_2 * number(uv, 0.0),
+                ]
+            });
+            stretch.clear();
+            stretch.extend(forms);
+            let angle = |hinge: usize| edges[self.angles[hinge] as usize];
+            self.surface
+                .solve(&self.reference, stretch, angle, placed, positions)
+        })
     }
 
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {

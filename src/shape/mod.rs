@@ -97,7 +97,7 @@ pub enum ShapeError {
     #[error("{what}: number {index} (0-based) is not finite")]
     NotFinite { what: &'static str, index: usize },
     /// See [`FactorError`].
-    #[error("the equations of the reference frame cannot be solved: {0}")]
+    #[error("the equations of the space cannot be solved: {0}")]
     Factor(#[from] FactorError),
     /// What is wrong with one of several frames.
     #[error("frame {frame} (1-based): {source}")]

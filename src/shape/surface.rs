@@ -50,7 +50,7 @@ impl Surface {
     }
 
     /// The frame in which triangles are stretched like this (any number for degenerate ones), hinges bent like this, and components placed at their six
-    /// numbers, as nearly as can be; and the steps it took to find the rotations, see [`Frames::solve`].
+    /// numbers, as nearly as can be. Errors as [`Frames::solve`].
     ///
     /// Triangles that no chain of hinges joins to the lowest of their component (only a vertex does, or a degenerate triangle) have no rotation of their own in
     /// these numbers: the lowest of each such part turns from the reference as that of the component does.
@@ -61,7 +61,7 @@ impl Surface {
         angle: impl Fn(usize) -> f64,
         placed: &[f64],
         positions: &mut [f64],
-    ) -> usize {
+    ) -> Result<(), ShapeError> {
         self.work.lend(|work| {
             let turns = self.hinges.iter().enumerate().map(|(i, hinge)| {
                 let [f, g] = hinge.triangles.map(|t| stretch[t as usize]);
@@ -78,7 +78,7 @@ impl Surface {
                     work.axes[root as usize] = times(&rotations[component], &rest_axes(rest));
                 }
             }
-            let steps = self.frames.solve(&work.relative, &mut work.axes);
+            self.frames.solve(&work.relative, &mut work.axes)?;
             let fill = |range: std::ops::Range<usize>, out: &mut [_]| {
                 let both = work.axes[range.clone()].iter().zip(&stretch[range]);
                 for (out, (axes, &[uu, vv, uv])) in out.iter_mut().zip(both) {
@@ -89,7 +89,7 @@ impl Surface {
             };
             self.poisson.solve(fill, positions);
             placement::place(reference, placed, positions);
-            steps
+            Ok(())
         })
     }
 }

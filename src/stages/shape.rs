@@ -1,7 +1,5 @@
 //! The stages of shape spaces (Cashman & Hormann 2012, section 5): frames to vectors and back.
 
-use faer::MatRef;
-
 use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
@@ -84,7 +82,7 @@ fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError>
 }
 
 /// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
-/// `truth`, which only judges read.
+/// `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
 pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
     let (n, d) = (sequence.frame_count(), sequence.dimension());
     let faces = sequence.connectivity().faces();
@@ -112,7 +110,9 @@ pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
         .map_err(StageError::from_error)?;
     let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
-    inputs.put("z", Array::columns(MatRef::from(z.as_ref())));
+    let between = z.subcols(0, n - 1) + z.subcols(1, n - 1);
+    let z = faer::concat![[z, 0.5 * between]];
+    inputs.put("z", Array::columns(z.as_ref()));
     inputs.put("truth", frames);
     Ok(inputs)
 }
