@@ -218,30 +218,27 @@ impl BandedNormal {
     pub fn new(columns: usize, equations: &[(usize, [f64; BAND])], least: f64) -> Option<Self> {
         let mut rows = vec![[0.0; BAND]; columns];
         products(equations, &mut rows);
-        let mut whole = [[0.0; BAND]; BAND];
-        for i in 0..columns {
-            let [pivot, a, b, c] = rows[i];
-            // `whole` carries what eliminations have taken from the next rows, so that no row waits for memory.
-            let line: [f64; BAND] = std::array::from_fn(|j| [pivot, a, b, c][j] - whole[0][j]);
-            if line[0].is_nan() || line[0] <= least * pivot {
+        // What eliminations have taken from the next rows, so that no row waits for memory; the last is always 0.
+        let mut taken = [[0.0; BAND]; BAND];
+        for row in &mut rows {
+            let line: [f64; BAND] = std::array::from_fn(|j| row[j] - taken[0][j]);
+            if line[0].is_nan() || line[0] <= least * row[0] {
                 return None;
             }
             let inverse = 1.0 / line[0];
             let unit = [line[1] * inverse, line[2] * inverse, line[3] * inverse];
-            let next = |r: usize, j: usize| {
-                if r + j < 3 {
-                    unit[r] * line[r + j + 1]
-                } else {
-                    0.0
-                }
-            };
-            whole = std::array::from_fn(|r| {
-                std::array::from_fn(|j| {
-                    let taken = if r + 1 < BAND { whole[r + 1][j] } else { 0.0 };
-                    taken + if r < 3 { next(r, j) } else { 0.0 }
-                })
-            });
-            rows[i] = [inverse, unit[0], unit[1], unit[2]];
+            for r in 0..BAND - 1 {
+                let later = taken[r + 1];
+                taken[r] = std::array::from_fn(|j| {
+                    let share = if r + j + 1 < BAND {
+                        unit[r] * line[r + j + 1]
+                    } else {
+                        0.0
+                    };
+                    later[j] + share
+                });
+            }
+            *row = [inverse, unit[0], unit[1], unit[2]];
         }
         Some(Self { rows })
     }

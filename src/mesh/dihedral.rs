@@ -19,37 +19,12 @@ pub fn hinge(pair: &Pair, faces: &[[u32; 3]]) -> [u32; 4] {
 pub fn dihedral_angle([i, j, k, l]: [Point; 4]) -> f64 {
     let edge = sub(j, i);
     let (f, g) = (cross(edge, sub(k, i)), cross(sub(l, i), edge));
-    angle(edge, sub(l, i), f, g)
-}
-
-/// With the normals, of any length, as f x g = -(f . (l - i)) edge.
-fn angle(edge: Point, to_l: Point, f: Point, g: Point) -> f64 {
-    // 0 - x, so that flat is +0.
-    let (sine, cosine) = (0.0 - norm(edge) * dot(f, to_l), dot(f, g));
+    // f x g = -(f . (l - i)) edge; 0 - x, so that flat is +0.
+    let (sine, cosine) = (0.0 - norm(edge) * dot(f, sub(l, i)), dot(f, g));
     match sine == 0.0 && cosine == 0.0 {
         true => 0.0,
         false => sine.atan2(cosine),
     }
-}
-
-/// The angle as [`dihedral_angle`] gives it, and its derivative by each corner: -n over the height at k and l, which i and j balance so that neither force nor
-/// moment is left. None where a triangle has no normal.
-pub fn dihedral_gradient([i, j, k, l]: [Point; 4]) -> Option<(f64, [Point; 4])> {
-    let (edge, to_k, to_l) = (sub(j, i), sub(k, i), sub(l, i));
-    let (f, g) = (cross(edge, to_k), cross(to_l, edge));
-    let (length2, f2, g2) = (dot(edge, edge), dot(f, f), dot(g, g));
-    let length = length2.sqrt();
-    // The unit normal over the height, which is |f| / length.
-    let (at_k, at_l) = (f.map(|x| x * (length / f2)), g.map(|x| x * (length / g2)));
-    let (k_foot, l_foot) = (dot(to_k, edge) / length2, dot(to_l, edge) / length2);
-    let gradient = [
-        std::array::from_fn(|x| (1.0 - k_foot) * at_k[x] + (1.0 - l_foot) * at_l[x]),
-        std::array::from_fn(|x| k_foot * at_k[x] + l_foot * at_l[x]),
-        at_k.map(|x| -x),
-        at_l.map(|x| -x),
-    ];
-    let finite = gradient.as_flattened().iter().all(|x| x.is_finite());
-    finite.then(|| (angle(edge, to_l, f, g), gradient))
 }
 
 #[cfg(test)]
@@ -123,7 +98,6 @@ mod tests {
             [i; 4],
         ] {
             assert_eq!(dihedral_angle(corners), 0.0);
-            assert_eq!(dihedral_gradient(corners), None);
         }
     }
 
@@ -151,32 +125,6 @@ mod tests {
             prop_assert!(close(dihedral_angle([j, i, l, k])), "the other triangle first");
             prop_assert!(close(-dihedral_angle([j, i, k, l])), "both turned round");
             prop_assert!(close(-dihedral_angle(corners.map(|[x, y, z]| [x, y, -z]))), "mirrored");
-        }
-
-        /// Against central differences, and neither force nor moment.
-        #[test]
-        fn gradient_by_differences(corners in corners()) {
-            prop_assume!(heights(corners) > 0.1);
-            let (angle, gradient) = dihedral_gradient(corners).unwrap();
-            prop_assert_eq!(angle, dihedral_angle(corners));
-            for p in 0..4 {
-                for x in 0..3 {
-                    let at = |step: f64| {
-                        let mut moved = corners;
-                        moved[p][x] += step;
-                        dihedral_angle(moved)
-                    };
-                    let difference = at(1e-6) - at(-1e-6);
-                    let difference = difference - 2.0 * PI * (difference / (2.0 * PI)).round();
-                    prop_assert!((difference / 2e-6 - gradient[p][x]).abs() < 1e-6 * (1.0 + gradient[p][x].abs()) * 10.0);
-                }
-            }
-            for x in 0..3 {
-                prop_assert!(gradient.iter().map(|g| g[x]).sum::<f64>().abs() < 1e-11);
-                let (y, z) = ((x + 1) % 3, (x + 2) % 3);
-                let moment = |(p, g): (&Point, &Point)| p[y] * g[z] - p[z] * g[y];
-                prop_assert!(corners.iter().zip(&gradient).map(moment).sum::<f64>().abs() < 1e-11);
-            }
         }
     }
 }

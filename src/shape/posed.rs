@@ -50,20 +50,6 @@ pub fn posed(rest: &Triangle, [a, b, c]: [Point; 3]) -> Posed {
     }
 }
 
-/// The stretch of a triangle whose sides (a,b), (b,c) and (c,a) have these lengths. Negative ones count as 0; where one is longer than the other two
-/// together, it counts as just so long, and the triangle is flat.
-pub fn stretch_of_lengths(rest: &Triangle, sides: [f64; 3]) -> Stretch {
-    let [ab, bc, ca] = within_reach(sides.map(|x| x.max(0.0)));
-    let (foot, height) = match ab > 0.0 {
-        true => (
-            ((ab - bc) * (ab + bc) + ca * ca) / (2.0 * ab),
-            twice_area([ab, bc, ca]) / ab,
-        ),
-        false => (0.0, ca),
-    };
-    plane_polar(plane_map(rest, ab, foot, height)).stretch
-}
-
 /// By columns, the map of the plane that takes (length, 0) and (foot, height) of the reference to (length, 0) and (foot, height).
 fn plane_map(rest: &Triangle, length: f64, foot: f64, height: f64) -> [[f64; 2]; 2] {
     let along = length / rest.length;
@@ -74,18 +60,6 @@ fn plane_map(rest: &Triangle, length: f64, foot: f64, height: f64) -> [[f64; 2];
             height / rest.height,
         ],
     ]
-}
-
-fn within_reach([ab, bc, ca]: [f64; 3]) -> [f64; 3] {
-    [ab.min(bc + ca), bc.min(ca + ab), ca.min(ab + bc)]
-}
-
-/// By Heron's formula, ordered so that thin triangles lose nothing (Kahan 2000).
-fn twice_area(mut sides: [f64; 3]) -> f64 {
-    sides.sort_unstable_by(|x, y| y.total_cmp(x));
-    let [a, b, c] = sides;
-    let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
-    0.5 * product.max(0.0).sqrt()
 }
 
 fn across(x: Point, axis: Point) -> Point {

@@ -47,7 +47,8 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// Frames of V vertices at these times, n x 3V positions.
+    /// Frames of V vertices at these times, n x 3V positions. Factors the space's systems; [`ShapeError::WrongLength`] where the representation is of
+    /// another mesh than its reference.
     pub fn sample(&self, times: &[f64]) -> Result<Vec<f64>, ShapeError> {
         if self.space == SpaceKind::Vertex {
             return Ok(self.representation.evaluate(times));
@@ -84,9 +85,6 @@ pub enum RepresentationError {
     /// See [`SplineError`].
     #[error("{path}: `u` and `control` are no time signal: {source}")]
     Spline { path: String, source: SplineError },
-    /// See [`ShapeError`].
-    #[error("{path}: {source}")]
-    Shape { path: String, source: ShapeError },
     /// Arrays that do not fit together.
     #[error("{path}: {what}; expected a representation as `meshseq signal fit` writes it")]
     Inconsistent { path: String, what: String },
@@ -165,24 +163,16 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
     }
     let connectivity = Connectivity::new(numbers / 3, faces);
     let connectivity = connectivity.map_err(|source| RepresentationError::Connectivity {
-        path: place.clone(),
+        path: place,
         source,
     })?;
-    let stored = Stored {
+    Ok(Stored {
         representation,
         positions,
         connectivity: Arc::new(connectivity),
         space,
         reference,
-    };
-    if space != SpaceKind::Vertex {
-        let sound = stored.prepare();
-        sound.map_err(|source| RepresentationError::Shape {
-            path: place,
-            source,
-        })?;
-    }
-    Ok(stored)
+    })
 }
 
 fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>, String), ArrayError> {

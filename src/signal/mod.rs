@@ -17,6 +17,7 @@
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
 //! text is off, `docs/READINGS.md` says how it is read; "reading r" below is its number r.
 
+mod basis;
 pub mod f;
 pub mod fidelity;
 pub mod file;

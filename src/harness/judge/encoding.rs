@@ -144,17 +144,25 @@ pub fn gradient_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, 
     ])
 }
 
+/// The z of two engines, row by row.
+pub(super) fn paired_rows<'a>(
+    ours: &'a Bundle,
+    theirs: &'a Bundle,
+) -> Result<impl Iterator<Item = (&'a [f64], &'a [f64])>, ArrayError> {
+    let (shape, a) = ours.f64("z", 2)?;
+    let b = shaped(theirs, "z", shape)?;
+    let d = shape[1].max(1);
+    Ok(a.chunks_exact(d).zip(b.chunks_exact(d)))
+}
+
 pub fn gradient_against(
     inputs: &Bundle,
     ours: &Bundle,
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
-    let (shape, a) = ours.f64("z", 2)?;
-    let b = shaped(theirs, "z", shape)?;
     let triangles = 9 * inputs.triangles("F")?.len();
     let (mut turned, mut numbers) = (0.0f64, 0.0f64);
-    let rows = a.chunks_exact(shape[1].max(1));
-    for (a, b) in rows.zip(b.chunks_exact(shape[1].max(1))) {
+    for (a, b) in paired_rows(ours, theirs)? {
         let both = a[..triangles]
             .chunks_exact(9)
             .zip(b[..triangles].chunks_exact(9));

@@ -5,8 +5,8 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
-use super::encoding::{Mesh, Vertices, edges, rotation};
-use super::{Measured, shaped};
+use super::Measured;
+use super::encoding::{Mesh, Vertices, edges, paired_rows, rotation};
 use crate::arrays::{ArrayError, Bundle};
 
 /// Where the numbers of a mesh are in z.
@@ -177,8 +177,6 @@ pub fn against(
     ours: &Bundle,
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
-    let (shape, a) = ours.f64("z", 2)?;
-    let b = shaped(theirs, "z", shape)?;
     let mesh = Mesh::new(inputs)?;
     let layout = Layout::new(&mesh.faces);
     let mut is_angle = vec![false; layout.components];
@@ -187,8 +185,7 @@ pub fn against(
         .iter()
         .for_each(|pair| is_angle[pair.place] = true);
     let (mut forms, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
-    let rows = a.chunks_exact(shape[1].max(1));
-    for (a, b) in rows.zip(b.chunks_exact(shape[1].max(1))) {
+    for (a, b) in paired_rows(ours, theirs)? {
         for (i, &angle) in is_angle.iter().enumerate() {
             match angle {
                 true => angles = angles.max(turn_gap(a[i], b[i])),
