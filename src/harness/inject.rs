@@ -73,6 +73,12 @@ faults! {
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
+    "halfway-straight" in "shape.halfway": "the mean of positions",
+        Outputs(|inputs, out| {
+            let end = inputs.f64("end", 2).map(|(_, end)| end.to_vec()).unwrap_or_default();
+            copy(inputs, "start", out, "frame");
+            numbers(out, "frame", |x| x.iter_mut().zip(end).for_each(|(x, end)| *x = 0.5 * (*x + end)));
+        });
     "h-sign" in "signal.h": "first direction and its coordinates negated",
         Outputs(|inputs, out| {
             let d = row_length(inputs, "Z");

@@ -60,6 +60,10 @@ tolerances! {
         "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
         "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
     }
+    "shape.halfway" {
+        "share_of_means" <= 0.1, "a limb that bends keeps its length; the mean of positions cuts across";
+        "length_difference" <= 0.02, "another energy: as-rigid-as-possible surfaces stretch a little where they bend";
+    }
     "signal.h" {
         "mean" <= 1e-14, "a mean of n frames";
         "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";

@@ -9,9 +9,11 @@
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 //! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
 
+pub mod branches;
 mod deformation;
 pub mod frames;
 pub mod gradient;
+pub mod halfway;
 pub mod hinges;
 pub mod lric;
 pub mod placement;
@@ -129,6 +131,9 @@ pub trait Space: Send + Sync {
 
     /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
     fn unwrap(&self, _previous: &[f64], _z: &mut [f64]) {}
+
+    /// Chooses the branches of the angles in `z` so that they change least from place to place on the surface: for poses that no motion joins.
+    fn unwrap_over_surface(&self, _z: &mut [f64]) {}
 }
 
 /// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.

@@ -45,6 +45,19 @@ pub struct FitOptions {
     pub pins: Vec<Pin>,
 }
 
+impl FitOptions {
+    /// These constants, the default knot rule, no pins.
+    pub fn new(k: usize, l: usize, m: usize) -> Self {
+        Self {
+            k,
+            l,
+            m,
+            knots: KnotRule::default(),
+            pins: Vec::new(),
+        }
+    }
+}
+
 /// Why there is no fit.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FitError {

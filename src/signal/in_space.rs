@@ -97,20 +97,32 @@ pub fn sample_in_space(
     decode_all(space, MatRef::from_column_major_slice(&z, d, times.len()))
 }
 
-fn rms_after_decoding(
+/// The mean square distance of the vertices of psi(i), decoded, from those of frame i, of each of the n frames.
+pub fn mean_squares(
+    space: &dyn Space,
+    frames: &[f64],
+    representation: &Representation,
+) -> Result<Vec<f64>, ShapeError> {
+    let n = representation.time.frame_count();
+    let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+    let decoded = sample_in_space(space, representation, &times)?;
+    let len = space.frame_len();
+    let of_frame = |(a, b): (&[f64], &[f64])| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>() / (len as f64 / 3.0)
+    };
+    let pairs = decoded.chunks(len).zip(frames.chunks(len));
+    Ok(pairs.map(of_frame).collect())
+}
+
+/// The root mean square distance of the vertices of all frames.
+pub fn rms_after_decoding(
     space: &dyn Space,
     frames: &[f64],
     representation: &Representation,
 ) -> Result<f64, ShapeError> {
-    let n = representation.time.frame_count();
-    let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let decoded = sample_in_space(space, representation, &times)?;
-    let square: f64 = decoded
-        .iter()
-        .zip(frames)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum();
-    Ok((square / (frames.len() as f64 / 3.0)).sqrt())
+    let each = mean_squares(space, frames, representation)?;
+    Ok((each.iter().sum::<f64>() / each.len() as f64).sqrt())
 }
 
 /// Sum of squared distances of the columns from their mean.

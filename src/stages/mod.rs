@@ -6,11 +6,12 @@ pub mod signal;
 
 use std::path::PathBuf;
 
-use faer::MatRef;
+use faer::{Mat, MatRef};
 use thiserror::Error;
 
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::sequence::Sequence;
+use crate::shape::{SpaceKind, encode_all, prepare};
 
 /// One step of an algorithm.
 pub struct Stage {
@@ -42,7 +43,7 @@ pub enum StageError {
 }
 
 impl StageError {
-    fn from_error(error: impl std::error::Error) -> Self {
+    pub(crate) fn from_error(error: impl std::error::Error) -> Self {
         Self::Failed(error.to_string())
     }
 }
@@ -91,6 +92,13 @@ fn call<T: 'static>(
     }))
 }
 
+/// The frames of a sequence in a space whose reference is the first of them.
+fn in_space(sequence: &Sequence, kind: SpaceKind) -> Result<Mat<f64>, StageError> {
+    let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0));
+    let space = space.map_err(StageError::from_error)?;
+    encode_all(&*space, sequence.positions()).map_err(StageError::from_error)
+}
+
 /// Inputs of a stage made from a sequence and, for `sequence.read`, the OBJ files it was read from.
 ///
 /// Stages of an algorithm are fed the Rust results of the stages before them, so that errors do not pile up.
@@ -121,7 +129,8 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
-        _ if stage.starts_with("shape.") => shape::inputs(stage, sequence),
-        _ => signal::inputs(stage, frames, choice),
+        _ if stage.starts_with("shape.") => shape::inputs(stage, sequence, choice),
+        _ if choice.space == SpaceKind::Vertex => signal::inputs(stage, frames, choice),
+        _ => signal::inputs(stage, in_space(sequence, choice.space)?.as_ref(), choice),
     }
 }

@@ -1,9 +1,12 @@
 //! The stages of shape spaces (Cashman & Hormann 2012, section 5): frames to vectors and back.
 
-use super::{Call, Stage, StageError, call};
+use super::{Call, Stage, StageError, call, signal::Choice};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
+use crate::mesh::measure::bounds;
+use crate::mesh::vector::{norm, sub};
 use crate::sequence::Sequence;
+use crate::shape::halfway::halfway;
 use crate::shape::{Space, SpaceKind, decode_all, encode_all, prepare};
 
 /// By space, encoding before decoding.
@@ -27,6 +30,11 @@ pub static STAGES: &[Stage] = &[
         name: "shape.lric_decode",
         about: "frames from rotation-invariant coordinates by two sparse systems (section 5)",
         prepare: |inputs| decode(SpaceKind::Lric, inputs),
+    },
+    Stage {
+        name: "shape.halfway",
+        about: "halfway between two poses that no motion joins, in a shape space (section 5; beside as-rigid-as-possible deformations)",
+        prepare: halfway_frame,
     },
 ];
 
@@ -68,12 +76,31 @@ fn decode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError>
     )
 }
 
+/// Between `start`, which is the reference too, and `end`, in the space that `space` names.
+fn halfway_frame(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let kind = inputs.text("space")?.parse();
+    let space = space_over(kind.map_err(StageError::from_error)?, "start", inputs)?;
+    let [start, end] = [inputs.f64("start", 2)?.1, inputs.f64("end", 2)?.1].map(<[f64]>::to_vec);
+    let shape = vec![start.len() / 3, 3];
+    call(
+        move || halfway(&*space, &start, &end).map_err(StageError::from_error),
+        move |frame| {
+            let (shape, data) = (shape.clone(), frame.clone());
+            Bundle::from([("frame", Array::F64 { shape, data })])
+        },
+    )
+}
+
 /// The space over the bundle's `reference` and `F`.
 fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
-    let (shape, reference) = inputs.f64("reference", 2)?;
+    space_over(kind, "reference", inputs)
+}
+
+fn space_over(kind: SpaceKind, name: &str, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
+    let (shape, reference) = inputs.f64(name, 2)?;
     if shape[1] != 3 {
         return Err(StageError::Failed(format!(
-            "`reference` has shape {shape:?}, expected (V, 3)"
+            "`{name}` has shape {shape:?}, expected (V, 3)"
         )));
     }
     let connectivity =
@@ -83,7 +110,10 @@ fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError>
 
 /// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
 /// `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
-pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
+pub fn inputs(stage: &str, sequence: &Sequence, choice: &Choice) -> Result<Bundle, StageError> {
+    if stage == "shape.halfway" {
+        return halfway_inputs(sequence, choice.space);
+    }
     let (n, d) = (sequence.frame_count(), sequence.dimension());
     let faces = sequence.connectivity().faces();
     let reference = Array::F64 {
@@ -115,4 +145,52 @@ pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
     inputs.put("z", Array::columns(z.as_ref()));
     inputs.put("truth", frames);
     Ok(inputs)
+}
+
+/// Vertices nearer to either end than this share of the diagonal are handles.
+const HELD: f64 = 0.08;
+
+/// From the first frame to the last. Handles, for engines that need some: the vertices around two that lie far apart in the first frame, held where
+/// Rust puts them halfway.
+fn halfway_inputs(sequence: &Sequence, kind: SpaceKind) -> Result<Bundle, StageError> {
+    let (start, end) = (
+        sequence.frame(0),
+        sequence.frame(sequence.frame_count() - 1),
+    );
+    let space = prepare(kind, sequence.connectivity().clone(), start);
+    let space = space.map_err(StageError::from_error)?;
+    let between = halfway(&*space, start, end).map_err(StageError::from_error)?;
+    let handles = ends(start);
+    let targets: Vec<f64> = handles
+        .iter()
+        .flat_map(|&v| between[3 * v..3 * v + 3].to_vec())
+        .collect();
+    let points = |data: Vec<f64>| Array::F64 {
+        shape: vec![data.len() / 3, 3],
+        data,
+    };
+    Ok(Bundle::from([
+        ("start", points(start.to_vec())),
+        ("end", points(end.to_vec())),
+        ("F", Array::triangles(sequence.connectivity().faces())),
+        ("space", Array::Text(kind.to_string())),
+        ("handles", Array::indices(&handles)),
+        ("targets", points(targets)),
+    ]))
+}
+
+/// The vertices around the one farthest from the first, and around the one farthest from that.
+fn ends(frame: &[f64]) -> Vec<usize> {
+    let points = frame.as_chunks::<3>().0;
+    let distance = |a: usize, b: usize| norm(sub(points[a], points[b]));
+    let farthest = |from: usize| {
+        let by_distance = |&a: &usize, &b: &usize| distance(from, a).total_cmp(&distance(from, b));
+        (0..points.len()).rev().max_by(by_distance).unwrap_or(0)
+    };
+    let one = farthest(0);
+    let other = farthest(one);
+    let near = HELD * bounds(frame).diagonal();
+    (0..points.len())
+        .filter(|&v| distance(v, one).min(distance(v, other)) <= near)
+        .collect()
 }

@@ -4,6 +4,7 @@ use faer::{Mat, MatRef};
 
 use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
+use crate::shape::SpaceKind;
 use crate::signal::f::Spline;
 use crate::signal::fit::{Fit, FitOptions, fit};
 use crate::signal::g::PoseSignal;
@@ -311,7 +312,7 @@ fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     )
 }
 
-/// Inputs of every stage made from a sequence by the Rust stages before it, so that errors do not pile up.
+/// Inputs of every stage made from frames (d x n, of the choice's space) by the Rust stages before it, so that errors do not pile up.
 pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<Bundle, StageError> {
     let z = Array::columns(frames);
     let [k, l, m] = [choice.k, choice.l, choice.m].map(Array::integer);
@@ -326,6 +327,7 @@ pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<B
             ("l", l),
             ("m", m),
             ("rule", rule),
+            ("space", Array::Text(choice.space.to_string())),
         ]));
     }
     Chain::new(frames, choice)?.inputs(stage)
@@ -338,7 +340,7 @@ pub fn at_frames(frames: MatRef<'_, f64>, choice: &Choice) -> Result<Vec<f64>, S
     Ok(fit.representation.evaluate(&times))
 }
 
-/// k, l, m, the knot rule, and how many frames are pinned where a stage has pins.
+/// k, l, m, the knot rule, how many frames are pinned where a stage has pins, and the space that the signals are fitted in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub k: usize,
@@ -346,6 +348,7 @@ pub struct Choice {
     pub m: usize,
     pub knots: KnotRule,
     pub pins: usize,
+    pub space: SpaceKind,
 }
 
 /// The reconstruction, from which the inputs of its stages are taken.

@@ -6,6 +6,7 @@ mod chain;
 mod distance;
 mod encoding;
 mod forms;
+mod halfway;
 mod pipeline;
 mod pose;
 mod scaling;
@@ -37,6 +38,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "shape.gradient_decode" | "shape.lric_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
         }
+        "shape.halfway" => (halfway::own, halfway::against),
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
         "signal.mds_fixed" => (scaling::fixed_own, scaling::fixed_against),
