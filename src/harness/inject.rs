@@ -73,6 +73,10 @@ faults! {
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
+    "poisson-entry" in "shape.poisson_factor": "the last entry of the matrix twice",
+        Inputs(|inputs| numbers(inputs, "values", |v| { let at = v.len() - 1; v[at] *= 2.0 }));
+    "poisson-relative" in "shape.poisson_solve": "solutions a millionth too large",
+        Outputs(|_, out| numbers(out, "x", stretch));
     "halfway-straight" in "shape.halfway": "the mean of positions",
         Outputs(|inputs, out| {
             let end = inputs.f64("end", 2).map(|(_, end)| end.to_vec()).unwrap_or_default();

@@ -60,6 +60,14 @@ tolerances! {
         "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
         "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
     }
+    "shape.poisson_factor" {
+        "backward_error" <= 1e-14, "a factorisation is backward stable";
+        "solution_difference" <= 1e-9, "the condition of a Poisson matrix with slivers, 1e5, times the backward errors";
+    }
+    "shape.poisson_solve" {
+        "backward_error" <= 1e-14, "a factorisation is backward stable";
+        "solution_difference" <= 1e-9, "the condition of a Poisson matrix with slivers, 1e5, times the backward errors";
+    }
     "shape.halfway" {
         "share_of_means" <= 0.1, "a limb that bends keeps its length; the mean of positions cuts across";
         "length_difference" <= 0.02, "another energy: as-rigid-as-possible surfaces stretch a little where they bend";

@@ -1,5 +1,6 @@
 //! The algorithms as named stages: plain arrays in, plain arrays out. `oracles/PROTOCOL.md` gives every stage's arrays.
 
+pub mod poisson;
 pub mod sequence;
 pub mod shape;
 pub mod signal;
@@ -50,7 +51,12 @@ impl StageError {
 
 /// Every stage, by system and in the order of the paper.
 pub fn all() -> impl Iterator<Item = &'static Stage> {
-    let systems = [sequence::STAGES, shape::STAGES, signal::STAGES];
+    let systems = [
+        sequence::STAGES,
+        shape::STAGES,
+        poisson::STAGES,
+        signal::STAGES,
+    ];
     systems.into_iter().flatten()
 }
 
@@ -129,6 +135,7 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
+        _ if stage.starts_with("shape.poisson_") => poisson::inputs(sequence),
         _ if stage.starts_with("shape.") => shape::inputs(stage, sequence, choice),
         _ if choice.space == SpaceKind::Vertex => signal::inputs(stage, frames, choice),
         _ => signal::inputs(stage, in_space(sequence, choice.space)?.as_ref(), choice),

@@ -11,6 +11,7 @@ mod pipeline;
 mod pose;
 mod scaling;
 mod shape;
+mod sparse;
 mod time;
 
 use crate::arrays::{ArrayError, Bundle};
@@ -38,6 +39,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "shape.gradient_decode" | "shape.lric_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
         }
+        "shape.poisson_factor" | "shape.poisson_solve" => (sparse::own, sparse::against),
         "shape.halfway" => (halfway::own, halfway::against),
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
