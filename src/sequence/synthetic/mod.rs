@@ -5,9 +5,11 @@
 //! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
 
 pub mod bar;
+pub mod book;
 pub mod flag;
 pub mod gallop;
 pub mod jelly;
+pub mod klein;
 pub mod roll;
 
 #[cfg(test)]
@@ -222,6 +224,42 @@ const CATALOGUE: &[Entry] = &[
         faces: 984,
         good_for: "tests of large elastic deformation",
         build: || jelly::build(&jelly::SMALL),
+    },
+    Entry {
+        name: "@book",
+        summary: "an open book whose pages share one spine and turn over one after another",
+        frames: 40,
+        vertices: 3225,
+        faces: 6144,
+        good_for: "a non-manifold mesh: eight triangles at every edge of the spine",
+        build: || book::build(&book::FULL),
+    },
+    Entry {
+        name: "@book-small",
+        summary: "@book with fewer pages and vertices",
+        frames: 40,
+        vertices: 310,
+        faces: 540,
+        good_for: "tests on non-manifold edges",
+        build: || book::build(&book::SMALL),
+    },
+    Entry {
+        name: "@klein",
+        summary: "a Klein bottle in space whose section turns while it breathes",
+        frames: 36,
+        vertices: 3456,
+        faces: 6912,
+        good_for: "a closed surface with one side: no outward normal, no volume",
+        build: || klein::build(&klein::FULL),
+    },
+    Entry {
+        name: "@klein-small",
+        summary: "@klein with fewer vertices",
+        frames: 36,
+        vertices: 392,
+        faces: 784,
+        good_for: "tests on a surface that cannot be oriented",
+        build: || klein::build(&klein::SMALL),
     },
 ];
 
