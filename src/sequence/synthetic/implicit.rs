@@ -27,8 +27,8 @@ impl Cone {
     }
 }
 
-/// The smooth union of cones, in their order. Never empty.
-#[derive(Clone, Debug)]
+/// The smooth union of cones, in their order; at least one before it is asked for anything.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Solid {
     pub cones: Vec<Cone>,
 }

@@ -4,6 +4,7 @@
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
 //! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
 
+pub mod animals;
 pub mod bar;
 pub mod book;
 pub mod flag;
@@ -12,10 +13,12 @@ pub mod jelly;
 pub mod klein;
 pub mod roll;
 
+mod body;
 #[cfg(test)]
 mod checks;
 mod cloth;
 mod grid;
+mod horse;
 mod implicit;
 mod quadruped;
 mod ride;
@@ -28,6 +31,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use self::animals::Animal;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
 
@@ -85,8 +89,8 @@ pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
 /// The markers of the embedded sequence of this name: the same names in the same order for all quadrupeds, none for the others.
 pub fn markers(name: &str) -> Result<Vec<Marker>, SyntheticError> {
     Ok(match entry(name)?.name {
-        "@gallop" => gallop::markers(&gallop::FULL),
-        "@gallop-small" => gallop::markers(&gallop::SMALL),
+        "@gallop" => animals::markers(Animal::Horse),
+        "@gallop-small" => animals::markers(Animal::SmallHorse),
         _ => Vec::new(),
     })
 }
@@ -196,7 +200,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 4082,
         faces: 8160,
         good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
-        build: || gallop::build(&gallop::FULL),
+        build: || gallop::build(Animal::Horse),
     },
     Entry {
         name: "@gallop-small",
@@ -205,7 +209,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 634,
         faces: 1264,
         good_for: "tests of articulated motion and of transfer between different connectivities",
-        build: || gallop::build(&gallop::SMALL),
+        build: || gallop::build(Animal::SmallHorse),
     },
     Entry {
         name: "@jelly",
