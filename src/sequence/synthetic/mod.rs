@@ -7,12 +7,14 @@
 pub mod animals;
 pub mod bar;
 pub mod book;
+pub mod character;
 pub mod flag;
 pub mod gallop;
 pub mod jelly;
 pub mod klein;
 pub mod roll;
 
+mod biped;
 mod body;
 #[cfg(test)]
 mod checks;
@@ -265,6 +267,24 @@ const CATALOGUE: &[Entry] = &[
         good_for: "tests on a surface that cannot be oriented",
         build: || klein::build(&klein::SMALL),
     },
+    Entry {
+        name: "@character",
+        summary: "a person who does jumping jacks, bows and twists, and marches in place",
+        frames: 99,
+        vertices: 3835,
+        faces: 7666,
+        good_for: "the size of Cashman & Hormann 2012, Figure 5 and Table 1: V = 3835, n = 99, d = 11505; large turns of limbs",
+        build: || character::build(&character::FULL),
+    },
+    Entry {
+        name: "@character-small",
+        summary: "@character with stouter limbs and fewer vertices, every third frame",
+        frames: 33,
+        vertices: 682,
+        faces: 1360,
+        good_for: "tests of large turns of limbs",
+        build: || character::build(&character::SMALL),
+    },
 ];
 
 #[cfg(test)]
@@ -305,10 +325,10 @@ mod tests {
         for entry in catalogue() {
             let sequence = embedded(entry.name).unwrap();
             // every third frame of a film is kept there
-            let limit = if entry.name == "@jelly-small" {
-                0.35
-            } else {
-                0.17
+            let limit = match entry.name {
+                "@jelly-small" => 0.35,
+                "@character-small" => 0.5,
+                _ => 0.17,
             };
             for i in 1..sequence.frame_count() {
                 let step = checks::largest_step(&sequence, i) / checks::diagonal(sequence.frame(0));
