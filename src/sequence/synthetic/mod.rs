@@ -75,6 +75,17 @@ pub enum SyntheticError {
         /// Every name there is, separated by commas.
         known: String,
     },
+    /// No frames were asked for.
+    #[error("expected at least one frame to make, found none; ask for one or more")]
+    NoFrames,
+    /// A strip without a quad.
+    #[error("a strip needs at least 1 x 1 quads, found {columns} x {rows}; give it more")]
+    NoQuads { columns: usize, rows: usize },
+    /// A strip rolled by a whole turn a column or more.
+    #[error(
+        "cannot roll a strip by {degrees} degrees: expected fewer than {limit} to either side, a whole turn a column"
+    )]
+    TooFar { degrees: f64, limit: f64 },
     /// A generator named a vertex that it did not make: a defect of this crate.
     #[error("an embedded sequence came out with bad faces, please report it: {0}")]
     Connectivity(#[from] ConnectivityError),
