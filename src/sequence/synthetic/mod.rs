@@ -4,16 +4,23 @@
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
 //! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
 
+pub mod animals;
 pub mod bar;
+pub mod book;
+pub mod character;
 pub mod flag;
 pub mod gallop;
 pub mod jelly;
+pub mod klein;
 pub mod roll;
 
+mod biped;
+mod body;
 #[cfg(test)]
 mod checks;
 mod cloth;
 mod grid;
+mod horse;
 mod implicit;
 mod quadruped;
 mod ride;
@@ -26,6 +33,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use self::animals::Animal;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
 
@@ -67,6 +75,17 @@ pub enum SyntheticError {
         /// Every name there is, separated by commas.
         known: String,
     },
+    /// No frames were asked for.
+    #[error("expected at least one frame to make, found none; ask for one or more")]
+    NoFrames,
+    /// A strip without a quad.
+    #[error("a strip needs at least 1 x 1 quads, found {columns} x {rows}; give it more")]
+    NoQuads { columns: usize, rows: usize },
+    /// A strip rolled by a whole turn a column or more.
+    #[error(
+        "cannot roll a strip by {degrees} degrees: expected fewer than {limit} to either side, a whole turn a column"
+    )]
+    TooFar { degrees: f64, limit: f64 },
     /// A generator named a vertex that it did not make: a defect of this crate.
     #[error("an embedded sequence came out with bad faces, please report it: {0}")]
     Connectivity(#[from] ConnectivityError),
@@ -83,8 +102,8 @@ pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
 /// The markers of the embedded sequence of this name: the same names in the same order for all quadrupeds, none for the others.
 pub fn markers(name: &str) -> Result<Vec<Marker>, SyntheticError> {
     Ok(match entry(name)?.name {
-        "@gallop" => gallop::markers(&gallop::FULL),
-        "@gallop-small" => gallop::markers(&gallop::SMALL),
+        "@gallop" => animals::markers(Animal::Horse),
+        "@gallop-small" => animals::markers(Animal::SmallHorse),
         _ => Vec::new(),
     })
 }
@@ -194,7 +213,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 4082,
         faces: 8160,
         good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
-        build: || gallop::build(&gallop::FULL),
+        build: || gallop::build(Animal::Horse),
     },
     Entry {
         name: "@gallop-small",
@@ -203,7 +222,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 634,
         faces: 1264,
         good_for: "tests of articulated motion and of transfer between different connectivities",
-        build: || gallop::build(&gallop::SMALL),
+        build: || gallop::build(Animal::SmallHorse),
     },
     Entry {
         name: "@jelly",
@@ -222,6 +241,60 @@ const CATALOGUE: &[Entry] = &[
         faces: 984,
         good_for: "tests of large elastic deformation",
         build: || jelly::build(&jelly::SMALL),
+    },
+    Entry {
+        name: "@book",
+        summary: "an open book whose pages share one spine and turn over one after another",
+        frames: 40,
+        vertices: 3225,
+        faces: 6144,
+        good_for: "a non-manifold mesh: eight triangles at every edge of the spine",
+        build: || book::build(&book::FULL),
+    },
+    Entry {
+        name: "@book-small",
+        summary: "@book with fewer pages and vertices",
+        frames: 40,
+        vertices: 310,
+        faces: 540,
+        good_for: "tests on non-manifold edges",
+        build: || book::build(&book::SMALL),
+    },
+    Entry {
+        name: "@klein",
+        summary: "a Klein bottle in space whose section turns while it breathes",
+        frames: 36,
+        vertices: 3456,
+        faces: 6912,
+        good_for: "a closed surface with one side: no outward normal, no volume",
+        build: || klein::build(&klein::FULL),
+    },
+    Entry {
+        name: "@klein-small",
+        summary: "@klein with fewer vertices",
+        frames: 36,
+        vertices: 392,
+        faces: 784,
+        good_for: "tests on a surface that cannot be oriented",
+        build: || klein::build(&klein::SMALL),
+    },
+    Entry {
+        name: "@character",
+        summary: "a person who does jumping jacks, bows and twists, and marches in place",
+        frames: 99,
+        vertices: 3835,
+        faces: 7666,
+        good_for: "the size of Cashman & Hormann 2012, Figure 5 and Table 1: V = 3835, n = 99, d = 11505; large turns of limbs",
+        build: || character::build(&character::FULL),
+    },
+    Entry {
+        name: "@character-small",
+        summary: "@character with stouter limbs and fewer vertices, every third frame",
+        frames: 33,
+        vertices: 682,
+        faces: 1360,
+        good_for: "tests of large turns of limbs",
+        build: || character::build(&character::SMALL),
     },
 ];
 
@@ -263,10 +336,10 @@ mod tests {
         for entry in catalogue() {
             let sequence = embedded(entry.name).unwrap();
             // every third frame of a film is kept there
-            let limit = if entry.name == "@jelly-small" {
-                0.35
-            } else {
-                0.17
+            let limit = match entry.name {
+                "@jelly-small" => 0.35,
+                "@character-small" => 0.5,
+                _ => 0.17,
             };
             for i in 1..sequence.frame_count() {
                 let step = checks::largest_step(&sequence, i) / checks::diagonal(sequence.frame(0));
