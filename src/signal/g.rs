@@ -12,6 +12,11 @@ use crate::linalg::kernels::{axpy, combine};
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
 
+/// Points evaluated together.
+const TOGETHER: usize = 32;
+/// Columns of coefficients taken at a time then; a multiple of the four that [`combine`] takes, so that sums keep their order.
+const COLUMNS: usize = 32;
+
 /// g(p) = g_0 + sum_j phi(||s_j - p||) g_j + G p, with phi(r) = r^2 ln r, in the units of the pose-space positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseSignal {
@@ -103,18 +108,38 @@ impl PoseSignal {
         axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
     }
 
-    /// g at many points, m x q.
+    /// g at many points, m x q, with the same bits as one by one.
     pub fn evaluate(&self, points: &[Point]) -> Mat<f64> {
         let m = self.coefficients.nrows();
         let mut values = vec![0.0; m * points.len()];
         if m > 0 {
             values
-                .par_chunks_mut(m)
-                .zip(points)
-                .with_min_len(16)
-                .for_each(|(x, &p)| self.evaluate_into(p, x));
+                .par_chunks_mut(m * TOGETHER)
+                .zip(points.par_chunks(TOGETHER))
+                .for_each(|(x, points)| self.evaluate_together(points, x));
         }
         MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
+    }
+
+    /// g at a few points, m numbers each: the coefficients go through the cache once for all of them.
+    fn evaluate_together(&self, points: &[Point], values: &mut [f64]) {
+        let (l, m) = (self.sites.len(), self.coefficients.nrows());
+        let mut bends = vec![0.0; l * points.len()];
+        for (i, (x, &p)) in values.chunks_exact_mut(m).zip(points).enumerate() {
+            kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
+            x.copy_from_slice(self.coefficients.col_as_slice(0));
+        }
+        for first in (0..l).step_by(COLUMNS) {
+            let last = (first + COLUMNS).min(l);
+            let column = |j: usize| self.coefficients.col_as_slice(first + j + 1);
+            for (i, x) in values.chunks_exact_mut(m).enumerate() {
+                combine(&bends[i * l + first..i * l + last], column, x);
+            }
+        }
+        for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
+            axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
+            axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
+        }
     }
 }
 
@@ -221,6 +246,23 @@ mod tests {
             assert!(sum(&|j| p[j][0]).abs() < 1e-12 * size * 100.0);
             assert!(sum(&|j| p[j][1]).abs() < 1e-12 * size * 100.0);
         }
+    }
+
+    #[test]
+    fn many_points_have_the_bits_of_each_by_itself() {
+        let (p, x) = (points(90), shapes(90));
+        let g = PoseSignal::fit(&p, x.as_ref(), &(0..70).collect::<Vec<_>>()).unwrap();
+        let all = g.evaluate(&p);
+        let mut one = [0.0; 3];
+        for (i, &p) in p.iter().enumerate() {
+            g.evaluate_into(p, &mut one);
+            assert_eq!(one[..], *all.col_as_slice(i));
+        }
+        let none = PoseSignal {
+            sites: Vec::new(),
+            coefficients: Mat::ones(2, 3),
+        };
+        assert_eq!(none.evaluate(&[[2.0, 3.0]]), Mat::full(2, 1, 6.0));
     }
 
     #[test]
