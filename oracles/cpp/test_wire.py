@@ -17,6 +17,7 @@ import numpy as np
 FOLDER = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parent / "python"))
 import checking  # noqa: E402
+import test_poisson  # noqa: E402
 import test_shapes  # noqa: E402
 from wire import read_message, write_message  # noqa: E402
 
@@ -105,6 +106,12 @@ def check_lengths(oracle):
     refused(oracle.run("shape.lengths_encode", reference=flat, F=F + 9, frames=flat[None]), "error")
 
 
+def check_poisson(oracle):
+    """The closed forms of python/test_poisson.py, which asks the Python oracle the same."""
+    test_poisson.check_poisson("c++", oracle.run, np.random.default_rng(1))
+    assert not checking.failures, checking.failures
+
+
 def check_rho(oracle):
     query = np.linspace(1, 6, 31)
     near(oracle.run("signal.rho", t=2 * np.arange(6.0), query=query), values=2 * (query - 1), slopes=np.full(6, 2.0))
@@ -166,6 +173,8 @@ PROGRAMS = [
     ([str(BUILD / "sequence_read_openmesh")], "sequence.read", check_read),
     ([str(BUILD / "sequence_distance_cgal")], "sequence.distance", check_distance),
     ([str(BUILD / "shape_lengths_openmesh")], "shape.lengths_encode", check_lengths),
+    ([str(BUILD / "shape_poisson_cholmod")], "shape.poisson_factor", check_poisson),
+    ([str(BUILD / "shape_poisson_eigen")], "shape.poisson_factor", check_poisson),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_rho_r.R")], "signal.rho", check_rho),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_spline_r.R")], "signal.spline", check_spline),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_h_r.R")], "signal.h", check_h),
