@@ -17,6 +17,7 @@ import numpy as np
 FOLDER = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parent / "python"))
 import checking  # noqa: E402
+import test_halfway  # noqa: E402
 import test_poisson  # noqa: E402
 import test_shapes  # noqa: E402
 from wire import read_message, write_message  # noqa: E402
@@ -89,6 +90,12 @@ def check_distance(oracle):
     refused(oracle.run("sequence.distance", A=square[None] * np.nan, B=square[None], F=faces), "error")
 
 
+def settle():
+    """What the checks shared with the Python oracles have found so far, and no more than once."""
+    found, checking.failures[:] = list(checking.failures), []
+    assert not found, found
+
+
 def check_lengths(oracle):
     """The closed forms of python/test_shapes.py, which asks the Python oracles the same."""
 
@@ -97,7 +104,7 @@ def check_lengths(oracle):
         return None if reply["status"] == "unsupported" else reply["out.z"]
 
     test_shapes.check_lengths_encode("openmesh", encode, np.random.default_rng(1), books=False, turned_over=False, near=3e-8)
-    assert not checking.failures, checking.failures
+    settle()
     flat, F = test_shapes.strip(2)
     flaps = oracle.run("shape.lengths_encode", reference=flat, F=np.concatenate([F, test_shapes.NEEDLE]), frames=flat[None])
     np.testing.assert_allclose(flaps["out.z"][0, 1:20:2], np.zeros(10), atol=3e-8)
@@ -109,7 +116,13 @@ def check_lengths(oracle):
 def check_poisson(oracle):
     """The closed forms of python/test_poisson.py, which asks the Python oracle the same."""
     test_poisson.check_poisson("c++", oracle.run, np.random.default_rng(1))
-    assert not checking.failures, checking.failures
+    settle()
+
+
+def check_halfway(oracle):
+    """The closed forms of python/test_halfway.py, which asks the Python oracle the same."""
+    test_halfway.check_halfway("cgal", lambda **inputs: oracle.run("shape.halfway", **inputs), books=False)
+    settle()
 
 
 def check_rho(oracle):
@@ -173,6 +186,7 @@ PROGRAMS = [
     ([str(BUILD / "sequence_read_openmesh")], "sequence.read", check_read),
     ([str(BUILD / "sequence_distance_cgal")], "sequence.distance", check_distance),
     ([str(BUILD / "shape_lengths_openmesh")], "shape.lengths_encode", check_lengths),
+    ([str(BUILD / "shape_halfway_cgal")], "shape.halfway", check_halfway),
     ([str(BUILD / "shape_poisson_cholmod")], "shape.poisson_factor", check_poisson),
     ([str(BUILD / "shape_poisson_eigen")], "shape.poisson_factor", check_poisson),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_rho_r.R")], "signal.rho", check_rho),

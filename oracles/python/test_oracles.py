@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+import test_halfway
 import test_poisson
 import test_shapes
 from checking import Oracle, check, close, failures
@@ -273,5 +274,6 @@ if __name__ == "__main__":
     test_distance(np.random.default_rng(5))
     test_shapes.run(np.random.default_rng(6))
     test_poisson.run(np.random.default_rng(7))
+    test_halfway.run()
     print(f"{len(failures)} failed" if failures else "all passed")
     sys.exit(bool(failures))
