@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+import test_edits
 import test_halfway
 import test_poisson
 import test_shapes
@@ -275,5 +276,6 @@ if __name__ == "__main__":
     test_shapes.run(np.random.default_rng(6))
     test_poisson.run(np.random.default_rng(7))
     test_halfway.run()
+    test_edits.run(np.random.default_rng(8))
     print(f"{len(failures)} failed" if failures else "all passed")
     sys.exit(bool(failures))
