@@ -162,6 +162,7 @@ fn representations_load_back_bit_for_bit() {
             connectivity: gallop.connectivity().clone(),
             space: SpaceKind::Vertex,
             reference: Vec::new(),
+            patches: Vec::new(),
         };
         let (bytes, loaded) = saved(&stored, &scratch.at("a.npz"));
         assert_eq!(all_bits(&stored), all_bits(&loaded));

@@ -8,12 +8,16 @@
 //! | [`vertex`] | 3V | positions |
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 //! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
+//! | [`patch`] | 9F + 3A + 6C | gradients against the mean rotations of patches, those against adjacent ones, rotations and centres of components |
 
 mod deformation;
 pub mod frames;
 pub mod gradient;
 pub mod hinges;
 pub mod lric;
+pub mod partition;
+pub mod patch;
+pub mod patches;
 pub mod placement;
 pub mod poisson;
 mod pool;
@@ -32,6 +36,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use self::partition::PatchError;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
@@ -44,11 +49,13 @@ pub enum SpaceKind {
     Gradient,
     /// Linear rotation-invariant coordinates (Lipman et al. 2005).
     Lric,
+    /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
+    Patch,
 }
 
 impl SpaceKind {
     /// Every space, in the order of the paper.
-    pub const ALL: [Self; 3] = [Self::Vertex, Self::Gradient, Self::Lric];
+    pub const ALL: [Self; 4] = [Self::Vertex, Self::Gradient, Self::Lric, Self::Patch];
 
     /// Its name on the command line and in stages.
     pub fn name(self) -> &'static str {
@@ -56,6 +63,7 @@ impl SpaceKind {
             Self::Vertex => "vertex",
             Self::Gradient => "gradient",
             Self::Lric => "lric",
+            Self::Patch => "patch",
         }
     }
 }
@@ -68,7 +76,7 @@ impl fmt::Display for SpaceKind {
 
 /// A name that no space has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no shape space `{0}`; there are vertex, gradient and lric")]
+#[error("there is no shape space `{0}`; there are vertex, gradient, lric and patch")]
 pub struct UnknownSpace(String);
 
 impl FromStr for SpaceKind {
@@ -99,6 +107,9 @@ pub enum ShapeError {
     /// See [`FactorError`].
     #[error("the equations of the space cannot be solved: {0}")]
     Factor(#[from] FactorError),
+    /// See [`PatchError`].
+    #[error(transparent)]
+    Patch(#[from] PatchError),
     /// What is wrong with one of several frames.
     #[error("frame {frame} (1-based): {source}")]
     Frame {
@@ -132,15 +143,19 @@ pub trait Space: Send + Sync {
 }
 
 /// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.
+///
+/// `patches` is the patch of each triangle, see [`patches::choose`]; only the space of patches looks at it, the others may be given none.
 pub fn prepare(
     kind: SpaceKind,
     connectivity: Arc<Connectivity>,
     reference: &[f64],
+    patches: &[i64],
 ) -> Result<Box<dyn Space>, ShapeError> {
     Ok(match kind {
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
         SpaceKind::Lric => Box::new(lric::LricSpace::new(connectivity, reference)?),
+        SpaceKind::Patch => Box::new(patch::PatchSpace::new(connectivity, reference, patches)?),
     })
 }
 

@@ -12,6 +12,7 @@
 //! | `p` | (n, 2) | pose-space positions of the frames |
 //! | `F` | (F, 3) | triangles, 0-based |
 //! | `reference` | (V, 3) | the shape space's reference frame; not in vertex space |
+//! | `patches` | (F) | the patch of each triangle, -1 for degenerate ones; in the space of patches |
 //! | `meta` | text | JSON: `format`, `space` |
 
 use std::path::Path;
@@ -44,6 +45,8 @@ pub struct Stored {
     pub space: SpaceKind,
     /// The shape space's reference frame, 3V positions; empty in vertex space.
     pub reference: Vec<f64>,
+    /// The patch of each triangle, see [`crate::shape::patches::choose`]; empty in spaces without patches.
+    pub patches: Vec<i64>,
 }
 
 impl Stored {
@@ -57,7 +60,8 @@ impl Stored {
     }
 
     fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {
-        let space = prepare(self.space, self.connectivity.clone(), &self.reference)?;
+        let connectivity = self.connectivity.clone();
+        let space = prepare(self.space, connectivity, &self.reference, &self.patches)?;
         check_len(
             "representation",
             &self.representation.offset,
@@ -111,6 +115,9 @@ pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
         let data = stored.reference.clone();
         arrays.push(("reference", Array::F64 { shape, data }));
     }
+    if stored.space == SpaceKind::Patch {
+        arrays.push(("patches", Array::integers(&stored.patches)));
+    }
     Ok(npz::write_arrays(path, &arrays)?)
 }
 
@@ -153,6 +160,10 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         SpaceKind::Vertex => Vec::new(),
         _ => bundle.f64("reference", 2).map_err(arrays)?.1.to_vec(),
     };
+    let patches = match space {
+        SpaceKind::Patch => bundle.integers("patches").map_err(arrays)?.to_vec(),
+        _ => Vec::new(),
+    };
     let numbers = match space {
         SpaceKind::Vertex => representation.dimension(),
         _ => reference.len(),
@@ -172,6 +183,7 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         connectivity: Arc::new(connectivity),
         space,
         reference,
+        patches,
     })
 }
 

@@ -138,6 +138,7 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
         let options = FitOptions {
@@ -158,6 +159,7 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
         let symmetric = KnotRule::Symmetric;

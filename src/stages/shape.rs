@@ -4,7 +4,7 @@ use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::shape::{Space, SpaceKind, decode_all, encode_all, prepare};
+use crate::shape::{Space, SpaceKind, decode_all, encode_all, patches, prepare};
 
 /// By space, encoding before decoding.
 pub static STAGES: &[Stage] = &[
@@ -27,6 +27,16 @@ pub static STAGES: &[Stage] = &[
         name: "shape.lric_decode",
         about: "frames from rotation-invariant coordinates by two sparse systems (section 5)",
         prepare: |inputs| decode(SpaceKind::Lric, inputs),
+    },
+    Stage {
+        name: "shape.patch_encode",
+        about: "gradients against the mean rotations of patches, those against adjacent ones (section 5; Baran et al. 2009)",
+        prepare: |inputs| encode(SpaceKind::Patch, inputs),
+    },
+    Stage {
+        name: "shape.patch_decode",
+        about: "frames from gradients in patches: rotations of patches, then one Poisson factorisation (section 5)",
+        prepare: |inputs| decode(SpaceKind::Patch, inputs),
     },
 ];
 
@@ -68,7 +78,7 @@ fn decode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError>
     )
 }
 
-/// The space over the bundle's `reference` and `F`.
+/// The space over the bundle's `reference` and `F`, and its `patches` where the space has some.
 fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
     let (shape, reference) = inputs.f64("reference", 2)?;
     if shape[1] != 3 {
@@ -78,11 +88,15 @@ fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError>
     }
     let connectivity =
         Connectivity::new(shape[0], inputs.triangles("F")?).map_err(StageError::from_error)?;
-    prepare(kind, connectivity.into(), reference).map_err(StageError::from_error)
+    let patches = match kind {
+        SpaceKind::Patch => inputs.integers("patches")?,
+        _ => &[],
+    };
+    prepare(kind, connectivity.into(), reference, patches).map_err(StageError::from_error)
 }
 
-/// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
-/// `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
+/// Inputs made from a sequence, whose first frame is the reference and whose movement gives the patches. Vectors to decode are what Rust encodes, with the
+/// frames they came from as `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
 pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
     let (n, d) = (sequence.frame_count(), sequence.dimension());
     let faces = sequence.connectivity().faces();
@@ -102,12 +116,19 @@ pub fn inputs(stage: &str, sequence: &Sequence) -> Result<Bundle, StageError> {
         return Err(StageError::Failed(format!("there is no stage `{stage}`")));
     };
     let kind: SpaceKind = name.parse().map_err(StageError::from_error)?;
+    let mut labels = Vec::new();
+    if kind == SpaceKind::Patch {
+        let mesh = sequence.connectivity().clone();
+        labels = patches::choose(mesh, sequence.frame(0), sequence.positions())
+            .map_err(StageError::from_error)?;
+        inputs.put("patches", Array::integers(&labels));
+    }
     if direction == "encode" {
         inputs.put("frames", frames);
         return Ok(inputs);
     }
-    let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0))
-        .map_err(StageError::from_error)?;
+    let mesh = sequence.connectivity().clone();
+    let space = prepare(kind, mesh, sequence.frame(0), &labels).map_err(StageError::from_error)?;
     let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
     let between = z.subcols(0, n - 1) + z.subcols(1, n - 1);
