@@ -51,6 +51,7 @@ fn fits_do_not_depend_on_threads() {
         "@jelly-small --k 20 --l 15 --m 9 --knots symmetric",
         "@jelly-small --tolerance 0.01",
         "@gallop-small --frames 1..20 --every 2 --k 12 --l 10 --m 9",
+        "@jelly-small --k 20 --l 15 --m 9 --space patch",
     ] {
         same_bytes("rep.npz", |out| {
             words(&format!("signal fit {choice} -o {out}"))

@@ -276,3 +276,307 @@ vectorised! {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::{Rotation3, Vector3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::sequence::synthetic::embedded;
+    use crate::shape::partition::PatchError;
+    use crate::shape::patches::choose;
+    use crate::shape::{decode_all, encode_all};
+
+    /// Two plates of 8 triangles that share an edge path, the second turned about it by an angle.
+    fn plates(angle: f64) -> Vec<f64> {
+        let turn = Rotation3::new(Vector3::y() * angle);
+        let place = |column: usize, row: usize| {
+            let (x, y) = (column as f64 - 2.0, row as f64);
+            let p = Vector3::new(x, y, 0.0);
+            let p = if column > 2 { turn * p } else { p };
+            [p.x, p.y, p.z]
+        };
+        (0..5)
+            .flat_map(|c| (0..3).flat_map(move |r| place(c, r)))
+            .collect()
+    }
+
+    fn plate_faces() -> Vec<[u32; 3]> {
+        let quad = |c: u32, r: u32| {
+            let a = 3 * c + r;
+            [[a, a + 3, a + 4], [a, a + 4, a + 1]]
+        };
+        (0..4)
+            .flat_map(|c| (0..2).flat_map(move |r| quad(c, r)))
+            .collect()
+    }
+
+    fn mesh(vertices: usize, faces: Vec<[u32; 3]>) -> Arc<Connectivity> {
+        Arc::new(Connectivity::new(vertices, faces).unwrap())
+    }
+
+    fn worst(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn what_turns_as_one_is_a_patch() {
+        let connectivity = mesh(15, plate_faces());
+        let rest = plates(0.0);
+        let halves: Vec<i64> = (0..16).map(|f| i64::from(f >= 8)).collect();
+        let bent = [rest.clone(), plates(1.0), plates(0.3)].concat();
+        assert_eq!(choose(connectivity.clone(), &rest, &bent).unwrap(), halves);
+        // 45 degrees are not yet too much.
+        assert_eq!(
+            choose(connectivity.clone(), &rest, &plates(0.78)).unwrap(),
+            [0; 16]
+        );
+        assert_eq!(
+            choose(connectivity.clone(), &rest, &plates(0.79)).unwrap(),
+            halves
+        );
+        let turned = Rotation3::new(Vector3::new(1.0, 2.0, 2.5));
+        let moved: Vec<f64> = bent
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .flat_map(|&p| <[f64; 3]>::from(turned * Vector3::from(p)))
+            .collect();
+        assert_eq!(choose(connectivity.clone(), &rest, &moved).unwrap(), halves);
+        assert_eq!(choose(connectivity, &rest, &[]).unwrap(), [0; 16]);
+    }
+
+    /// Of the quadruped: connected patches, none small, as many as it has limbs or more; the same in any number of threads.
+    #[test]
+    fn patches_of_an_animal() {
+        let sequence = embedded("@gallop-small").unwrap();
+        let connectivity = sequence.connectivity();
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| {
+                choose(
+                    connectivity.clone(),
+                    sequence.frame(0),
+                    sequence.positions(),
+                )
+                .unwrap()
+            })
+        };
+        let labels = run(1);
+        assert_eq!(labels, run(3));
+        let reference = Reference::new(connectivity.clone(), sequence.frame(0)).unwrap();
+        let topology = Topology::new(connectivity.faces());
+        let partition = Partition::new(&reference, &topology, &labels).unwrap();
+        let patches = partition.patches();
+        assert!((5..100).contains(&patches), "{patches}");
+        let inside = topology
+            .pairs()
+            .map(|p| [p.first.triangle, p.second.triangle]);
+        let inside = inside.filter(|&[f, g]| labels[f as usize] == labels[g as usize]);
+        let (_, parts) = crate::mesh::topology::linked(labels.len(), inside);
+        assert_eq!(parts, patches);
+        let areas = reference.area_shares();
+        let mut sums = vec![0.0; patches];
+        labels
+            .iter()
+            .zip(&areas)
+            .for_each(|(&p, area)| sums[p as usize] += area);
+        let least = sums.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(least > areas.iter().sum::<f64>() / 500.0);
+    }
+
+    /// Fans that touch at a vertex only: no edge leads from part to part, so a patch does.
+    #[test]
+    fn parts_that_touch_at_a_vertex_are_joined() {
+        let connectivity = mesh(5, vec![[0, 1, 2], [2, 3, 4]]);
+        let rest = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [2.0, 1.0, 0.0],
+            [2.0, 2.0, 0.0],
+        ];
+        let bent = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [1.0, 1.0, 1.0],
+            [1.0, 2.0, 1.3],
+        ];
+        let [rest, bent] = [rest, bent].map(|x| x.as_flattened().to_vec());
+        let labels = choose(connectivity.clone(), &rest, &bent).unwrap();
+        assert_eq!(labels, [0, 0]);
+        let back = |labels: &[i64]| {
+            let space = PatchSpace::new(connectivity.clone(), &rest, labels).unwrap();
+            let z = encode_all(&space, &bent).unwrap();
+            decode_all(&space, z.as_ref()).unwrap()
+        };
+        assert!(worst(&bent, &back(&labels)) < 1e-14);
+        // Labels of one's own that leave them apart: the second turns as its component does, and nothing is lost but that.
+        let apart = back(&[0, 1]);
+        assert!(apart.iter().all(|x| x.is_finite()) && worst(&bent, &apart) > 0.1);
+    }
+
+    #[test]
+    fn turns_are_counted() {
+        let connectivity = mesh(15, plate_faces());
+        let labels: Vec<i64> = (0..16).map(|f| i64::from(f >= 8)).collect();
+        let space = PatchSpace::new(connectivity, &plates(0.0), &labels).unwrap();
+        let frames: Vec<f64> = (0..36)
+            .flat_map(|i| plates((20.0 * f64::from(i)).to_radians()))
+            .collect();
+        let z = encode_all(&space, &frames).unwrap();
+        let pair = space.pair_numbers();
+        for i in 0..36 {
+            let v = &z.col_as_slice(i)[pair.clone()];
+            assert!(
+                worst(v, &[0.0, (20.0 * i as f64).to_radians(), 0.0]) < 1e-13,
+                "{i}: {v:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_roll_keeps_well_away_from_half_turns() {
+        let roll = embedded("@roll-small").unwrap();
+        let labels = choose(roll.connectivity().clone(), roll.frame(0), roll.positions()).unwrap();
+        let space = PatchSpace::new(roll.connectivity().clone(), roll.frame(0), &labels).unwrap();
+        let z = encode_all(&space, roll.frame(roll.frame_count() - 1)).unwrap();
+        let pair = space.pair_numbers();
+        let angle = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let z = z.col_as_slice(0);
+        let inside = z[..pair.start]
+            .chunks(NUMBERS)
+            .map(|n| angle(&n[..3]))
+            .fold(0.0, f64::max);
+        let across = z[pair].chunks(PAIR).map(angle).fold(0.0, f64::max);
+        assert!(
+            inside < 0.2 * TAU && across < 0.3 * TAU,
+            "{inside} {across}"
+        );
+    }
+
+    #[test]
+    fn labels_are_checked() {
+        // Two triangles apart, one without area.
+        let points = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [5.0, 0.0, 0.0],
+            [6.0, 0.0, 0.0],
+            [5.0, 1.0, 0.0],
+        ];
+        let connectivity = mesh(6, vec![[0, 1, 2], [0, 1, 1], [3, 4, 5]]);
+        let made = |labels: &[i64]| match PatchSpace::new(
+            connectivity.clone(),
+            points.as_flattened(),
+            labels,
+        ) {
+            Ok(space) => Ok(space.patches()),
+            Err(ShapeError::Patch(error)) => Err(error),
+            Err(other) => panic!("{other}"),
+        };
+        assert_eq!(made(&[1, -1, 0]), Ok(2));
+        assert_eq!(
+            made(&[0, -1]),
+            Err(PatchError::WrongCount {
+                expected: 3,
+                found: 2
+            })
+        );
+        assert_eq!(
+            made(&[0, 0, 1]),
+            Err(PatchError::BadLabel {
+                triangle: 1,
+                found: 0
+            })
+        );
+        assert_eq!(
+            made(&[0, -1, -1]),
+            Err(PatchError::BadLabel {
+                triangle: 2,
+                found: -1
+            })
+        );
+        assert_eq!(
+            made(&[0, -1, i64::MAX]),
+            Err(PatchError::BadLabel {
+                triangle: 2,
+                found: i64::MAX
+            })
+        );
+        assert_eq!(made(&[0, -1, 2]), Err(PatchError::Empty { patch: 1 }));
+        assert_eq!(
+            made(&[0, -1, 0]),
+            Err(PatchError::Divided {
+                patch: 0,
+                first: 0,
+                second: 2
+            })
+        );
+    }
+
+    #[test]
+    fn a_crowd_at_one_edge_is_refused() {
+        let pages = 6000u32;
+        let faces = (0..pages).map(|i| [0, 1, i + 2]).collect();
+        let mut points = vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        points.extend((0..pages).flat_map(|i| [f64::from(i).cos(), f64::from(i).sin(), 0.5]));
+        let labels: Vec<i64> = (0..i64::from(pages)).collect();
+        let refused = PatchSpace::new(mesh(pages as usize + 2, faces), &points, &labels);
+        assert_eq!(refused.err(), Some(ShapeError::Patch(PatchError::Crowded)));
+    }
+
+    #[test]
+    fn nothing_at_all() {
+        for (vertices, faces) in [(0, vec![]), (2, vec![]), (2, vec![[0, 1, 1]])] {
+            let (connectivity, frame) = (mesh(vertices, faces), vec![0.25; 3 * vertices]);
+            let labels = choose(connectivity.clone(), &frame, &frame).unwrap();
+            let space = PatchSpace::new(connectivity, &frame, &labels).unwrap();
+            let mut z = vec![0.0; space.dimension()];
+            let mut back = vec![0.0; frame.len()];
+            space.encode(&frame, &mut z).unwrap();
+            space.decode(&z, &mut back).unwrap();
+            assert!(worst(&frame, &back) < 1e-15);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Patches of any shape, in pieces too, give frames back, and rigid motions touch nothing but the placement.
+        #[test]
+        fn any_patches_do(
+            picks in prop::collection::vec(0i64..7, 4000), frame in 0usize..24, axis in prop::array::uniform3(-1.0f64..1.0),
+        ) {
+            let sequence = embedded("@gallop-small").unwrap();
+            let faces = sequence.connectivity().faces().len();
+            // All seven are there.
+            let labels: Vec<i64> = (0..faces).map(|f| if f < 7 { f as i64 } else { picks[f % picks.len()] }).collect();
+            let space = PatchSpace::new(sequence.connectivity().clone(), sequence.frame(0), &labels).unwrap();
+            let frame = sequence.frame(frame);
+            let turn = Rotation3::new(Vector3::from(axis) * 1.5);
+            let moved: Vec<f64> = frame.as_chunks::<3>().0.iter()
+                .flat_map(|&p| <[f64; 3]>::from(turn * Vector3::from(p) + Vector3::new(1.0, -2.0, 3.0))).collect();
+            let z = [frame, &moved].map(|frame| encode_all(&space, frame).unwrap());
+            for (z, frame) in z.iter().zip([frame, &moved]) {
+                let found = worst(frame, &decode_all(&space, z.as_ref()).unwrap());
+                prop_assert!(found < 1e-11, "{found}");
+            }
+            let shape = ..space.pair_numbers().end;
+            let [a, b] = z.each_ref().map(|z| &z.col_as_slice(0)[shape]);
+            prop_assert!(worst(a, b) < 1e-11, "{}", worst(a, b));
+        }
+    }
+}

@@ -256,3 +256,60 @@ fn foreign(meta: &str) -> Result<SpaceKind, String> {
     name.parse()
         .map_err(|unknown: UnknownSpace| format!("`meta`: {unknown}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::dataset::open;
+    use crate::shape::patches;
+    use crate::signal::fit::FitOptions;
+    use crate::signal::in_space::fit_in_space;
+    use crate::signal::knots::KnotRule;
+
+    #[test]
+    fn patches_are_stored_and_needed() {
+        let sequence = open("@gallop-small").unwrap();
+        let n = sequence.frame_count();
+        let mesh = sequence.connectivity().clone();
+        let labels = patches::choose(mesh.clone(), sequence.frame(0), sequence.positions());
+        let labels = labels.unwrap();
+        assert!(labels.contains(&1));
+        let space = prepare(SpaceKind::Patch, mesh.clone(), sequence.frame(0), &labels);
+        let options = FitOptions {
+            k: n + 2,
+            l: n,
+            m: n - 1,
+            knots: KnotRule::Symmetric,
+            pins: Vec::new(),
+        };
+        let fit = fit_in_space(&*space.unwrap(), sequence.positions(), &options).unwrap();
+        assert!(fit.rms < 1e-9, "{}", fit.rms);
+        let mut stored = Stored {
+            representation: fit.fit.representation,
+            positions: fit.fit.positions,
+            connectivity: mesh,
+            space: SpaceKind::Patch,
+            reference: sequence.frame(0).to_vec(),
+            patches: labels,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("patches.npz");
+        save(&stored, &path).unwrap();
+        let loaded = load(&path).unwrap();
+        assert_eq!(loaded, stored);
+        let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+        let frames = loaded.sample(&times).unwrap();
+        let gaps = frames.iter().zip(sequence.positions());
+        let worst = gaps.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-8, "{worst}");
+        // One patch less is another space, no patches are none.
+        stored.patches.iter_mut().for_each(|p| *p = 0);
+        let refused = stored.sample(&times);
+        assert!(
+            matches!(refused, Err(ShapeError::WrongLength { .. })),
+            "{refused:?}"
+        );
+        stored.patches.clear();
+        assert!(matches!(stored.sample(&times), Err(ShapeError::Patch(_))));
+    }
+}

@@ -6,6 +6,7 @@ mod chain;
 mod distance;
 mod encoding;
 mod forms;
+mod patched;
 mod pipeline;
 mod pose;
 mod scaling;
@@ -34,7 +35,8 @@ fn judge(stage: &str) -> Option<Judge> {
         "sequence.distance" => (distance::own, distance::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
-        "shape.gradient_decode" | "shape.lric_decode" => {
+        "shape.patch_encode" => (patched::own, patched::against),
+        "shape.gradient_decode" | "shape.lric_decode" | "shape.patch_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
         }
         "signal.h" => (shape::own, shape::against),
