@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use meshseq::mesh::Connectivity;
-use meshseq::shape::{Space, SpaceKind, prepare};
+use meshseq::shape::{Space, SpaceKind, prepare_for};
 
 /// Faces of the meshes: some from a thousand to a million.
 const FACES: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
@@ -37,8 +37,8 @@ fn sheet(faces: usize) -> (Connectivity, [Vec<f64>; 2]) {
     (connectivity, [frame(0.0, 0.0), frame(1.0, 2.0)])
 }
 
-fn space(kind: SpaceKind, connectivity: Connectivity, reference: &[f64]) -> Box<dyn Space> {
-    prepare(kind, connectivity.into(), reference).expect("a sheet is a sound reference")
+fn space(kind: SpaceKind, connectivity: &Connectivity, frames: &[f64]) -> Box<dyn Space> {
+    prepare_for(kind, &connectivity.clone().into(), frames).expect("a sheet is a sound reference")
 }
 
 fn spaces(c: &mut Criterion) {
@@ -49,10 +49,11 @@ fn spaces(c: &mut Criterion) {
             .measurement_time(Duration::from_secs(3));
         for faces in FACES {
             let (connectivity, [reference, frame]) = sheet(faces);
+            let both = [&reference[..], &frame].concat();
             group.bench_function(BenchmarkId::new("prepare", faces), |b| {
-                b.iter(|| space(kind, connectivity.clone(), &reference));
+                b.iter(|| space(kind, &connectivity, &both));
             });
-            let space = space(kind, connectivity.clone(), &reference);
+            let space = space(kind, &connectivity, &both);
             let mut z = vec![0.0; space.dimension()];
             group.bench_function(BenchmarkId::new("encode", faces), |b| {
                 b.iter(|| space.encode(&frame, &mut z));

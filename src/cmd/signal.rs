@@ -12,7 +12,7 @@ use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
 use crate::sequence::format::write;
-use crate::shape::{SpaceKind, prepare};
+use crate::shape::{SpaceKind, patches, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, load, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
@@ -64,7 +64,7 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// Shape space: vertex, gradient or lric
+    /// Shape space: vertex, gradient, lric or patch
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given
@@ -114,7 +114,15 @@ impl FitVerb {
             None => Vec::new(),
         };
         let reference = self.reference(&sequence, space)?;
-        let fitted = self.fit(&sequence, space, &reference, knots, pins)?;
+        let patches = match space {
+            SpaceKind::Patch => patches::choose(
+                sequence.connectivity().clone(),
+                &reference,
+                sequence.positions(),
+            )?,
+            _ => Vec::new(),
+        };
+        let fitted = self.fit(&sequence, space, &reference, &patches, knots, pins)?;
         let numbers = numbers(&sequence, &fitted, space, knots);
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
@@ -126,6 +134,7 @@ impl FitVerb {
                 connectivity: sequence.connectivity().clone(),
                 space,
                 reference,
+                patches,
             };
             save(&stored, out)?;
         }
@@ -166,6 +175,7 @@ impl FitVerb {
         sequence: &Sequence,
         space: SpaceKind,
         reference: &[f64],
+        patches: &[i64],
         knots: KnotRule,
         pins: Vec<Pin>,
     ) -> Result<SpaceFit, Failure> {
@@ -190,7 +200,8 @@ impl FitVerb {
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
             return Ok(SpaceFit { fit, rms });
         }
-        let prepared = prepare(space, sequence.connectivity().clone(), reference)?;
+        let connectivity = sequence.connectivity().clone();
+        let prepared = prepare(space, connectivity, reference, patches)?;
         let frames = sequence.positions();
         Ok(match &constants {
             Some(options) => fit_in_space(&*prepared, frames, options)?,

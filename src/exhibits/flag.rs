@@ -4,7 +4,7 @@ use super::render::{PLAIN, View};
 use super::signals::{poses, time_signal};
 use super::{Exhibit, ExhibitError};
 use crate::sequence::dataset::{DataFolders, open};
-use crate::shape::{SpaceKind, prepare};
+use crate::shape::{SpaceKind, prepare_for};
 use crate::signal::fit::FitOptions;
 use crate::signal::in_space::{fit_in_space, sample_in_space};
 
@@ -14,8 +14,8 @@ const SHOWN: [f64; 6] = [1.0, 20.0, 40.0, 60.0, 80.0, 100.0];
 
 pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let sequence = open(DATASET)?;
-    let connectivity = sequence.connectivity().clone();
-    let space = prepare(SpaceKind::Gradient, connectivity, sequence.frame(0));
+    let (mesh, positions) = (sequence.connectivity(), sequence.positions());
+    let space = prepare_for(SpaceKind::Gradient, mesh, positions);
     let space = space.map_err(ExhibitError::of(NAME))?;
     let options = FitOptions::new(98, 100, 79);
     let found = fit_in_space(&*space, sequence.positions(), &options);

@@ -8,7 +8,7 @@ use crate::sequence::Sequence;
 use crate::sequence::dataset::{DataFolders, open};
 use crate::sequence::synthetic::roll::roll_angle;
 use crate::shape::halfway::halfway;
-use crate::shape::{SpaceKind, prepare};
+use crate::shape::{SpaceKind, prepare_for};
 
 const NAME: &str = "large-turns";
 const STRIP: &str = "@roll";
@@ -53,9 +53,11 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
 
 fn run(kind: SpaceKind, sequence: &Sequence, turns: &[usize]) -> Result<Run, ExhibitError> {
     let flat = sequence.frame(0);
-    let space = prepare(kind, sequence.connectivity().clone(), flat);
-    let space = space.map_err(ExhibitError::of(NAME))?;
-    let between = |&turn: &usize| halfway(&*space, flat, sequence.frame(turn));
+    let between = |&turn: &usize| {
+        let both = [flat, sequence.frame(turn)].concat();
+        let space = prepare_for(kind, sequence.connectivity(), &both)?;
+        halfway(&*space, flat, sequence.frame(turn))
+    };
     let frames: Result<Vec<_>, _> = turns.iter().map(between).collect();
     let frames = frames.map_err(ExhibitError::of(NAME))?;
     let topology = Topology::new(sequence.connectivity().faces());

@@ -6,7 +6,7 @@ use super::case::Case;
 use super::record::FitFigures;
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
-use crate::shape::{Space, encode_all, prepare};
+use crate::shape::{Space, encode_all, prepare_for};
 use crate::signal::fit::Fit;
 use crate::signal::in_space::{mean_squares, rms_after_decoding};
 use crate::stages::StageError;
@@ -59,10 +59,10 @@ struct Frames<'a> {
 
 impl<'a> Frames<'a> {
     fn new(case: &Case, sequence: &'a Sequence) -> Result<Self, StageError> {
-        let connectivity = sequence.connectivity().clone();
-        let space = prepare(case.choice.space, connectivity, sequence.frame(0));
+        let (mesh, positions) = (sequence.connectivity(), sequence.positions());
+        let space = prepare_for(case.choice.space, mesh, positions);
         let space = space.map_err(StageError::from_error)?;
-        let z = encode_all(&*space, sequence.positions()).map_err(StageError::from_error)?;
+        let z = encode_all(&*space, positions).map_err(StageError::from_error)?;
         Ok(Self {
             sequence,
             space,

@@ -83,6 +83,26 @@ faults! {
             copy(inputs, "start", out, "frame");
             numbers(out, "frame", |x| x.iter_mut().zip(end).for_each(|(x, end)| *x = 0.5 * (*x + end)));
         });
+    "patch-relative" in "shape.patch_encode": "stretches a millionth too large",
+        Outputs(|inputs, out| each_triangle(inputs, out, |numbers| stretch(&mut numbers[3..])));
+    "patch-backwards" in "shape.patch_encode": "rotations of adjacent patches the other way round",
+        Outputs(|inputs, out| each_pair(inputs, out, "z", |z| z.iter_mut().for_each(|x| *x = -*x)));
+    "patch-boundary" in "shape.patch_encode": "a triangle counted to the patch beside it",
+        Inputs(|inputs| {
+            let labels = inputs.integers("patches").unwrap_or_default().to_vec();
+            let faces = inputs.triangles("F").unwrap_or_default();
+            let pair = crate::mesh::topology::Topology::new(&faces).pairs().map(|p| [p.first, p.second].map(|h| h.triangle as usize))
+                .find(|&[f, g]| labels[f] != labels[g]);
+            if let Some([f, g]) = pair { integers(inputs, "patches", |p| p[f] = p[g]); }
+        });
+    "patch-turn-dropped" in "shape.patch_encode": "components without their rotation",
+        Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
+    "patch-bent" in "shape.patch_decode": "adjacent patches turned a millionth more against each other",
+        Inputs(|inputs| { let given = inputs.clone(); each_pair(&given, inputs, "z", stretch) });
+    "patch-wrong-frame" in "shape.patch_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "patch-frames" in "shape.patch_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
     "h-sign" in "signal.h": "first direction and its coordinates negated",
         Outputs(|inputs, out| {
             let d = row_length(inputs, "Z");
@@ -217,6 +237,16 @@ fn each_triangle(inputs: &Bundle, out: &mut Bundle, change: impl Fn(&mut [f64]))
     numbers(out, "z", |z| {
         let rows = z.chunks_mut(d);
         rows.for_each(|row| row[..9 * triangles].chunks_mut(9).for_each(&change));
+    });
+}
+
+/// The rotation vectors of adjacent patches in every row of a one-component encoding.
+fn each_pair(inputs: &Bundle, bundle: &mut Bundle, name: &str, change: impl Fn(&mut [f64])) {
+    let triangles = inputs.triangles("F").map_or(0, |faces| faces.len());
+    let d = row_length(bundle, name);
+    numbers(bundle, name, |z| {
+        z.chunks_mut(d)
+            .for_each(|row| change(&mut row[9 * triangles..d - 6]));
     });
 }
 

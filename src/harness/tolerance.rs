@@ -72,6 +72,20 @@ tolerances! {
         "share_of_means" <= 0.1, "a limb that bends keeps its length; the mean of positions cuts across";
         "length_difference" <= 0.02, "another energy: as-rigid-as-possible surfaces stretch a little where they bend";
     }
+    "shape.patch_encode" {
+        "formula" <= 1e-12, "R_p R S times the reference's edges are the frame's edges, over the diagonal, R_p along a chain of patches";
+        "stretch" <= 1e-12, "a stretch has no negative eigenvalue";
+        "mean" <= 1e-12, "R_p is the rotation nearest to the mean, so that of what is left is none";
+        "joints" <= 1e-12, "the rotations of pairs of patches agree around every loop";
+        "placement" <= 1e-13, "a mean of vertices, over the diagonal; a vertex by itself does not turn";
+        "rotation_difference" <= 1e-10, "as gradients: slivers";
+        "patch_difference" <= 1e-12, "means over areas, in which slivers hardly count";
+        "number_difference" <= 1e-10, "as gradients: slivers";
+    }
+    "shape.patch_decode" {
+        "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
+        "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
+    }
     "signal.h" {
         "mean" <= 1e-14, "a mean of n frames";
         "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";

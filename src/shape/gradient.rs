@@ -106,21 +106,10 @@ impl Space for GradientSpace {
     }
 
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {
-        let end = self.triangle_numbers().min(z.len()).min(previous.len());
-        let before = previous[..end].par_chunks(NUMBERS * ALONE);
-        z[..end]
-            .par_chunks_mut(NUMBERS * ALONE)
-            .zip(before)
-            .for_each(|(z, before)| {
-                let before = before.as_chunks::<NUMBERS>().0;
-                for (z, before) in z.as_chunks_mut::<NUMBERS>().0.iter_mut().zip(before) {
-                    let (vector, to) = (&mut z[..3], &before[..3]);
-                    vector.copy_from_slice(&nearest_branch(
-                        [vector[0], vector[1], vector[2]],
-                        [to[0], to[1], to[2]],
-                    ));
-                }
-            });
+        let end = self.triangle_numbers();
+        if previous.len() == self.dimension() && z.len() == self.dimension() {
+            unwrap_triangles(&previous[..end], &mut z[..end]);
+        }
     }
 
     fn unwrap_over_surface(&self, z: &mut [f64]) {
@@ -131,6 +120,22 @@ impl Space for GradientSpace {
             self.neighbours().unwrap(&mut vectors);
         }
     }
+}
+
+/// Chooses the branches of the rotation vectors of triangles, nine numbers each, nearest to those of `previous`.
+pub(super) fn unwrap_triangles(previous: &[f64], z: &mut [f64]) {
+    let before = previous.par_chunks(NUMBERS * ALONE);
+    let both = z.par_chunks_mut(NUMBERS * ALONE).zip(before);
+    both.for_each(|(z, before)| {
+        let before = before.as_chunks::<NUMBERS>().0;
+        for (z, before) in z.as_chunks_mut::<NUMBERS>().0.iter_mut().zip(before) {
+            let (vector, to) = (&mut z[..3], &before[..3]);
+            vector.copy_from_slice(&nearest_branch(
+                [vector[0], vector[1], vector[2]],
+                [to[0], to[1], to[2]],
+            ));
+        }
+    });
 }
 
 vectorised! {
@@ -158,7 +163,7 @@ vectorised! {
 
 vectorised! {
     /// The gradients of triangles from `first` on, a multiple of the lanes.
-    fn decode_triangles(deformation: &Deformation, first: usize, z: &[[f64; NUMBERS]], out: &mut [Gradient]) {
+    pub(super) fn decode_triangles(deformation: &Deformation, first: usize, z: &[[f64; NUMBERS]], out: &mut [Gradient]) {
         for (block, (z, out)) in z.chunks(LANES).zip(out.chunks_mut(LANES)).enumerate() {
             let mut numbers = Lanes::<NUMBERS>::ZERO;
             for (lane, z) in z.iter().enumerate() {

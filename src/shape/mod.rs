@@ -8,6 +8,7 @@
 //! | [`vertex`] | 3V | positions |
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 //! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
+//! | [`patch`] | 9F + 3A + 6C | gradients against the mean rotations of patches, those against adjacent ones, rotations and centres of components |
 
 pub mod branches;
 mod deformation;
@@ -16,6 +17,9 @@ pub mod gradient;
 pub mod halfway;
 pub mod hinges;
 pub mod lric;
+pub mod partition;
+pub mod patch;
+pub mod patches;
 pub mod placement;
 pub mod poisson;
 mod pool;
@@ -34,6 +38,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use self::partition::PatchError;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
@@ -46,11 +51,13 @@ pub enum SpaceKind {
     Gradient,
     /// Linear rotation-invariant coordinates (Lipman et al. 2005).
     Lric,
+    /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
+    Patch,
 }
 
 impl SpaceKind {
     /// Every space, in the order of the paper.
-    pub const ALL: [Self; 3] = [Self::Vertex, Self::Gradient, Self::Lric];
+    pub const ALL: [Self; 4] = [Self::Vertex, Self::Gradient, Self::Lric, Self::Patch];
 
     /// Its name on the command line and in stages.
     pub fn name(self) -> &'static str {
@@ -58,6 +65,7 @@ impl SpaceKind {
             Self::Vertex => "vertex",
             Self::Gradient => "gradient",
             Self::Lric => "lric",
+            Self::Patch => "patch",
         }
     }
 }
@@ -70,7 +78,7 @@ impl fmt::Display for SpaceKind {
 
 /// A name that no space has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no shape space `{0}`; there are vertex, gradient and lric")]
+#[error("there is no shape space `{0}`; there are vertex, gradient, lric and patch")]
 pub struct UnknownSpace(String);
 
 impl FromStr for SpaceKind {
@@ -101,6 +109,9 @@ pub enum ShapeError {
     /// See [`FactorError`].
     #[error("the equations of the space cannot be solved: {0}")]
     Factor(#[from] FactorError),
+    /// See [`PatchError`].
+    #[error(transparent)]
+    Patch(#[from] PatchError),
     /// What is wrong with one of several frames.
     #[error("frame {frame} (1-based): {source}")]
     Frame {
@@ -137,16 +148,35 @@ pub trait Space: Send + Sync {
 }
 
 /// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.
+///
+/// `patches` is the patch of each triangle, see [`patches::choose`]; only the space of patches looks at it, the others may be given none.
 pub fn prepare(
     kind: SpaceKind,
     connectivity: Arc<Connectivity>,
     reference: &[f64],
+    patches: &[i64],
 ) -> Result<Box<dyn Space>, ShapeError> {
     Ok(match kind {
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
         SpaceKind::Lric => Box::new(lric::LricSpace::new(connectivity, reference)?),
+        SpaceKind::Patch => Box::new(patch::PatchSpace::new(connectivity, reference, patches)?),
     })
+}
+
+/// Prepares a space over the first of these frames (3V positions each), with patches found from all of them where the space has some.
+pub fn prepare_for(
+    kind: SpaceKind,
+    connectivity: &Arc<Connectivity>,
+    frames: &[f64],
+) -> Result<Box<dyn Space>, ShapeError> {
+    let len = 3 * connectivity.vertex_count();
+    let reference = frames.get(..len).unwrap_or(frames);
+    let patches = match kind {
+        SpaceKind::Patch => patches::choose(connectivity.clone(), reference, frames)?,
+        _ => Vec::new(),
+    };
+    prepare(kind, connectivity.clone(), reference, &patches)
 }
 
 /// The vectors of n frames (n x 3V positions, frame after frame) as the columns of a d x n matrix. Frames run in parallel, then branches are

@@ -150,6 +150,7 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
         let options = FitOptions {
@@ -170,6 +171,7 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
         let symmetric = KnotRule::Symmetric;

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::sequence::Sequence;
-use crate::shape::{SpaceKind, encode_all, prepare};
+use crate::shape::{SpaceKind, encode_all, prepare_for};
 
 /// One step of an algorithm.
 pub struct Stage {
@@ -100,7 +100,7 @@ fn call<T: 'static>(
 
 /// The frames of a sequence in a space whose reference is the first of them.
 fn in_space(sequence: &Sequence, kind: SpaceKind) -> Result<Mat<f64>, StageError> {
-    let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0));
+    let space = prepare_for(kind, sequence.connectivity(), sequence.positions());
     let space = space.map_err(StageError::from_error)?;
     encode_all(&*space, sequence.positions()).map_err(StageError::from_error)
 }

@@ -7,7 +7,7 @@ use crate::mesh::measure::bounds;
 use crate::mesh::vector::{norm, sub};
 use crate::sequence::Sequence;
 use crate::shape::halfway::halfway;
-use crate::shape::{Space, SpaceKind, decode_all, encode_all, prepare};
+use crate::shape::{Space, SpaceKind, decode_all, encode_all, patches, prepare, prepare_for};
 
 /// By space, encoding before decoding.
 pub static STAGES: &[Stage] = &[
@@ -30,6 +30,16 @@ pub static STAGES: &[Stage] = &[
         name: "shape.lric_decode",
         about: "frames from rotation-invariant coordinates by two sparse systems (section 5)",
         prepare: |inputs| decode(SpaceKind::Lric, inputs),
+    },
+    Stage {
+        name: "shape.patch_encode",
+        about: "gradients against the mean rotations of patches, those against adjacent ones (section 5; Baran et al. 2009)",
+        prepare: |inputs| encode(SpaceKind::Patch, inputs),
+    },
+    Stage {
+        name: "shape.patch_decode",
+        about: "frames from gradients in patches: rotations of patches, then one Poisson factorisation (section 5)",
+        prepare: |inputs| decode(SpaceKind::Patch, inputs),
     },
     Stage {
         name: "shape.halfway",
@@ -79,8 +89,13 @@ fn decode(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Call>, StageError>
 /// Between `start`, which is the reference too, and `end`, in the space that `space` names.
 fn halfway_frame(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let kind = inputs.text("space")?.parse();
-    let space = space_over(kind.map_err(StageError::from_error)?, "start", inputs)?;
-    let [start, end] = [inputs.f64("start", 2)?.1, inputs.f64("end", 2)?.1].map(<[f64]>::to_vec);
+    let kind = kind.map_err(StageError::from_error)?;
+    let faces = inputs.triangles("F")?;
+    let (shape, start) = inputs.f64("start", 2)?;
+    let (start, end) = (start.to_vec(), inputs.f64("end", 2)?.1.to_vec());
+    let mesh = Connectivity::new(shape[0], faces).map_err(StageError::from_error)?;
+    let both = [&start[..], &end].concat();
+    let space = prepare_for(kind, &mesh.into(), &both).map_err(StageError::from_error)?;
     let shape = vec![start.len() / 3, 3];
     call(
         move || halfway(&*space, &start, &end).map_err(StageError::from_error),
@@ -91,25 +106,25 @@ fn halfway_frame(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     )
 }
 
-/// The space over the bundle's `reference` and `F`.
+/// The space over the bundle's `reference` and `F`, and its `patches` where the space has some.
 fn space(kind: SpaceKind, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
-    space_over(kind, "reference", inputs)
-}
-
-fn space_over(kind: SpaceKind, name: &str, inputs: &Bundle) -> Result<Box<dyn Space>, StageError> {
-    let (shape, reference) = inputs.f64(name, 2)?;
+    let (shape, reference) = inputs.f64("reference", 2)?;
     if shape[1] != 3 {
         return Err(StageError::Failed(format!(
-            "`{name}` has shape {shape:?}, expected (V, 3)"
+            "`reference` has shape {shape:?}, expected (V, 3)"
         )));
     }
     let connectivity =
         Connectivity::new(shape[0], inputs.triangles("F")?).map_err(StageError::from_error)?;
-    prepare(kind, connectivity.into(), reference).map_err(StageError::from_error)
+    let patches = match kind {
+        SpaceKind::Patch => inputs.integers("patches")?,
+        _ => &[],
+    };
+    prepare(kind, connectivity.into(), reference, patches).map_err(StageError::from_error)
 }
 
-/// Inputs made from a sequence, whose first frame is the reference. Vectors to decode are what Rust encodes, with the frames they came from as
-/// `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
+/// Inputs made from a sequence, whose first frame is the reference and whose movement gives the patches. Vectors to decode are what Rust encodes, with the
+/// frames they came from as `truth`, which only judges read; then the means of every two in a row, which are the vectors of no frame.
 pub fn inputs(stage: &str, sequence: &Sequence, choice: &Choice) -> Result<Bundle, StageError> {
     if stage == "shape.halfway" {
         return halfway_inputs(sequence, choice.space);
@@ -132,12 +147,19 @@ pub fn inputs(stage: &str, sequence: &Sequence, choice: &Choice) -> Result<Bundl
         return Err(StageError::Failed(format!("there is no stage `{stage}`")));
     };
     let kind: SpaceKind = name.parse().map_err(StageError::from_error)?;
+    let mut labels = Vec::new();
+    if kind == SpaceKind::Patch {
+        let mesh = sequence.connectivity().clone();
+        labels = patches::choose(mesh, sequence.frame(0), sequence.positions())
+            .map_err(StageError::from_error)?;
+        inputs.put("patches", Array::integers(&labels));
+    }
     if direction == "encode" {
         inputs.put("frames", frames);
         return Ok(inputs);
     }
-    let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0))
-        .map_err(StageError::from_error)?;
+    let mesh = sequence.connectivity().clone();
+    let space = prepare(kind, mesh, sequence.frame(0), &labels).map_err(StageError::from_error)?;
     let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
     let between = z.subcols(0, n - 1) + z.subcols(1, n - 1);
@@ -157,7 +179,7 @@ fn halfway_inputs(sequence: &Sequence, kind: SpaceKind) -> Result<Bundle, StageE
         sequence.frame(0),
         sequence.frame(sequence.frame_count() - 1),
     );
-    let space = prepare(kind, sequence.connectivity().clone(), start);
+    let space = prepare_for(kind, sequence.connectivity(), &[start, end].concat());
     let space = space.map_err(StageError::from_error)?;
     let between = halfway(&*space, start, end).map_err(StageError::from_error)?;
     let handles = ends(start);

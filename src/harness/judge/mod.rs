@@ -7,6 +7,7 @@ mod distance;
 mod encoding;
 mod forms;
 mod halfway;
+mod patched;
 mod pipeline;
 mod pose;
 mod scaling;
@@ -36,7 +37,8 @@ fn judge(stage: &str) -> Option<Judge> {
         "sequence.distance" => (distance::own, distance::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
-        "shape.gradient_decode" | "shape.lric_decode" => {
+        "shape.patch_encode" => (patched::own, patched::against),
+        "shape.gradient_decode" | "shape.lric_decode" | "shape.patch_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
         }
         "shape.poisson_factor" | "shape.poisson_solve" => (sparse::own, sparse::against),
