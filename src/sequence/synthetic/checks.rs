@@ -163,6 +163,12 @@ pub(super) fn largest_stretch(sequence: &Sequence, rest: &[Vector3<f64>]) -> f64
     worst
 }
 
+/// The root of the sum of squared distances between the vertices of two frames.
+pub(super) fn distance(sequence: &Sequence, i: usize, j: usize) -> f64 {
+    let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
+    pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
 /// How far the fastest vertex moves from frame `frame - 1` to `frame`.
 pub(super) fn largest_step(sequence: &Sequence, frame: usize) -> f64 {
     let (before, after) = (

@@ -99,10 +99,7 @@ mod tests {
     #[test]
     fn the_second_cycle_resembles_the_first_but_differs() {
         let sequence = embedded("@gallop").unwrap();
-        let distance = |i: usize, j: usize| {
-            let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
-            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-        };
+        let distance = |i: usize, j: usize| checks::distance(&sequence, i, j);
         for i in 0..CYCLE {
             let (across, along) = (distance(i, i + CYCLE), distance(i, (i + 6) % FRAMES));
             assert!(across < 0.35 * along, "{i}: {across} {along}");
