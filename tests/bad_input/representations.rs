@@ -242,7 +242,12 @@ fn patches_that_are_none() {
         |b| b.put("patches", Array::vector(&[0.0; 12])),
         &["`patches`", "an i64 array of rank 1"],
     );
-    with(|p| drop(p.pop()), &["11 patch labels for 12 triangles"]);
+    with(
+        |p| {
+            p.pop();
+        },
+        &["11 patch labels for 12 triangles"],
+    );
     with(|p| p[3] = -1, &["triangle 3", "label -1"]);
     with(
         |p| p[3] = i64::MAX,
