@@ -44,5 +44,10 @@ pub fn against(
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
     let [[a, _, expected], [b, ..]] = [lengths(inputs, ours)?, lengths(inputs, theirs)?];
-    Ok(vec![("length_difference", share((a - b).abs(), expected))])
+    // Means of positions are what the others are to differ from.
+    let name = match inputs.text("space")? {
+        "vertex" => "length_shrunk_by_means",
+        _ => "length_difference",
+    };
+    Ok(vec![(name, share((a - b).abs(), expected))])
 }

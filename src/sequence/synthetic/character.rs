@@ -80,12 +80,22 @@ fn pose(at: f64, body: &Body) -> Pose {
         raise: [8.0; 2],
         elbow: [12.0; 2],
         spread: -5.0,
-        ..Joints::default()
+        ..sway(at)
     };
     jump(&mut joints, at / 26.0, window(0.0, 52.0, at));
     bow(&mut joints, (at - 50.0) / 26.0, window(50.0, 76.0, at));
     march(&mut joints, (at - 74.0) / 14.0, window(74.0, 98.0, at));
     ground(joints.pose(), joints.hop, body)
+}
+
+/// Shifts from foot to foot in no rhythm of the exercise, so that no frame is the copy of another.
+fn sway(at: f64) -> Joints {
+    Joints {
+        bow: 2.0 * (0.137 * at).sin(),
+        twist: 3.0 * (0.0911 * at + 1.0).sin(),
+        nod: 2.0 * (0.213 * at).cos(),
+        ..Joints::default()
+    }
 }
 
 /// Fades in after `from` and out before `to`, over six frames each.
