@@ -2,7 +2,8 @@
 //!
 //! Every sequence is deterministic to the bit on one machine (one thread, no clock, no chance) and takes well under a second in a release
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
-//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
+//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests. Most are motions; `@face`,
+//! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time.
 
 pub mod animals;
 pub mod bar;
