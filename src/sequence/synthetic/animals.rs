@@ -1,7 +1,8 @@
 //! The quadrupeds, and any of them in any pose; `@gallop-poses` and `@trot-poses`.
 //!
 //! Two animals of different proportions and connectivity with the same bones and markers: a pose of one is a pose of the other, which makes the
-//! example pairs of deformation transfer (Cashman & Hormann 2012, section 4.3), and the true answer to compare a transfer with.
+//! example pairs of deformation transfer (Cashman & Hormann 2012, section 4.3), and the answer to compare a transfer with: the gallop given to
+//! the hound is [`posed`]`(Animal::Hound, ..)` in the poses of [`gallop::pose`](super::gallop::pose).
 
 use super::horse::HORSE;
 use super::hound::HOUND;
@@ -71,10 +72,15 @@ pub fn posed(animal: Animal, poses: &[Pose]) -> Result<Sequence, SyntheticError>
 /// The frames of `@gallop` (0-based) that follow the animal at rest in `@gallop-poses`: seven phases of a cycle, taken from both cycles.
 pub const KEY_FRAMES: [usize; 7] = [0, 3, 7, 10, 14, 17, 21];
 
-/// Standing at rest, for the reference pose, and seven poses of the gallop: as many examples as in Cashman & Hormann 2012, Figure 7 (m = 7).
+/// The pose at rest, standing: the one that [`markers`] are taken in.
+pub fn standing() -> Pose {
+    Pose::rest(BONES)
+}
+
+/// [`standing`], for the reference pose, and seven poses of the gallop: as many examples as in Cashman & Hormann 2012, Figure 7 (m = 7).
 pub fn key_poses() -> Vec<Pose> {
     let gallop = KEY_FRAMES.map(|frame| gallop::pose(frame as f64));
-    [vec![Pose::rest(BONES)], gallop.to_vec()].concat()
+    [vec![standing()], gallop.to_vec()].concat()
 }
 
 pub(super) fn build_poses(animal: Animal) -> Result<Sequence, SyntheticError> {

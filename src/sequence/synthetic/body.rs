@@ -110,3 +110,8 @@ impl Body {
         placed
     }
 }
+
+/// The rotation about a unit vector.
+pub(super) fn about(axis: Vector3<f64>, degrees: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::new(axis * degrees.to_radians())
+}

@@ -7,10 +7,10 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::biped::{ARMS, BONES, CHEST, HEAD, LEG, LEGS, PELVIS, biped};
-use super::body::{Body, Pose};
+use super::body::{Body, Pose, about};
 use super::implicit::smooth_minimum;
 use super::skin::Weights;
 use super::{SyntheticError, assemble, smoothstep};
@@ -186,15 +186,11 @@ fn ground(mut pose: Pose, hop: f64, body: &Body) -> Pose {
     let [left, right] = [0, 1].map(|side| {
         let [x, y, z] = LEG[2];
         let ankle = Vector3::new(x, y, if side == 0 { -z } else { z });
-        (placed[LEGS[side] + 2] * nalgebra::Point3::from(ankle)).y
+        (placed[LEGS[side] + 2] * Point3::from(ankle)).y
     });
     let lower = smooth_minimum(left, right, 0.03);
     pose.root = Isometry3::translation(0.0, rest - lower + hop, 0.0);
     pose
-}
-
-fn about(axis: Vector3<f64>, degrees: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::new(axis * degrees.to_radians())
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The proportions of a horse, for `@gallop`.
 
-use super::quadruped::{Anatomy, CHEST, HEAD, Leg, NECK, Part, TORSO};
+use super::quadruped::{Anatomy, CHEST, HEAD, Leg, NECK, TORSO, part};
 
 const UP: [f64; 2] = [0.0, 1.0];
 const DOWN: [f64; 2] = [0.0, -1.0];
@@ -84,13 +84,3 @@ pub(super) const HORSE: Anatomy = Anatomy {
         [[1.0, 1.8], [0.4, -1.0]],
     ],
 };
-
-const fn part(bone: usize, ends: [[f64; 2]; 2], radii: [f64; 2], flatten: f64, blend: f64) -> Part {
-    Part {
-        bone,
-        ends,
-        radii,
-        flatten,
-        blend,
-    }
-}

@@ -2,16 +2,19 @@
 //!
 //! Every sequence is deterministic to the bit on one machine (one thread, no clock, no chance) and takes well under a second in a release
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
-//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
+//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests. Most are motions; `@face`,
+//! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time.
 
 pub mod animals;
 pub mod bar;
 pub mod book;
 pub mod character;
+pub mod face;
 pub mod flag;
 pub mod gallop;
 pub mod jelly;
 pub mod klein;
+pub mod ring;
 pub mod roll;
 pub mod trot;
 
@@ -353,6 +356,42 @@ const CATALOGUE: &[Entry] = &[
         faces: 1372,
         good_for: "tests of transfer by examples",
         build: || animals::build_poses(Animal::SmallHound),
+    },
+    Entry {
+        name: "@face",
+        summary: "nine expressions of one face, the neutral one first",
+        frames: 9,
+        vertices: 3200,
+        faces: 6144,
+        good_for: "designing a sequence from poses, as in Cashman & Hormann 2012, Figure 8",
+        build: || face::build(&face::FULL),
+    },
+    Entry {
+        name: "@face-small",
+        summary: "@face with fewer vertices",
+        frames: 9,
+        vertices: 480,
+        faces: 864,
+        good_for: "tests of design from poses",
+        build: || face::build(&face::SMALL),
+    },
+    Entry {
+        name: "@loop",
+        summary: "a rubber ring round which a bulge and a wave run, one whole period",
+        frames: 32,
+        vertices: 2688,
+        faces: 5376,
+        good_for: "looping: the last frame leads into the first",
+        build: || ring::build(&ring::FULL),
+    },
+    Entry {
+        name: "@loop-small",
+        summary: "@loop with fewer vertices",
+        frames: 32,
+        vertices: 396,
+        faces: 792,
+        good_for: "tests of looping, and of a closed surface with a handle",
+        build: || ring::build(&ring::SMALL),
     },
 ];
 

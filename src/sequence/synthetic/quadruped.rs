@@ -47,6 +47,22 @@ pub(super) struct Part {
     pub blend: f64,
 }
 
+pub(super) const fn part(
+    bone: usize,
+    ends: [[f64; 2]; 2],
+    radii: [f64; 2],
+    flatten: f64,
+    blend: f64,
+) -> Part {
+    Part {
+        bone,
+        ends,
+        radii,
+        flatten,
+        blend,
+    }
+}
+
 /// A right leg: hip or shoulder, then joint by joint down to the hoof, and how far each bone's cone blends with the others.
 pub(super) struct Leg {
     pub joints: [[f64; 3]; 5],

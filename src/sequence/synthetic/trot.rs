@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::SyntheticError;
 use super::animals::{Animal, Pose, posed};
+use super::body::about;
 use super::quadruped::{BONES, CHEST, HEAD, LEGS, NECK, TAIL, TORSO, about_z, bump};
 use crate::sequence::Sequence;
 
@@ -94,12 +95,9 @@ fn fore_leg(at: f64) -> [f64; 4] {
     ]
 }
 
-fn about(axis: Vector3<f64>, degrees: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::new(axis * degrees.to_radians())
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::animals::standing;
     use super::super::{checks, embedded, markers};
     use super::*;
 
@@ -176,7 +174,7 @@ mod tests {
                 markers.iter().map(|m| m.vertex).collect();
             assert_eq!(vertices.len(), markers.len(), "{name}");
         }
-        let rest = posed(Animal::Hound, &[Pose::rest(BONES)]).unwrap();
+        let rest = posed(Animal::Hound, &[standing()]).unwrap();
         let points = checks::points(rest.frame(0));
         for marker in markers("@trot").unwrap() {
             let z = points[marker.vertex as usize].z;
