@@ -12,7 +12,7 @@ use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
 use super::mds::{Dissimilarities, scale};
-use super::parameters::{centripetal, distinct};
+use super::parameters::{Grid, centripetal, distinct};
 use super::pins::{Pin, PinError, principal_start, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
@@ -326,7 +326,9 @@ impl Base {
 
     fn spline(&self, k: usize, rule: KnotRule) -> Result<(Spline, Vec<Point>), FitError> {
         let t = distinct(&self.parameters);
-        let u = knots(&t, k.min(t.len() + 2), rule)?;
+        let mut u = knots(&t, k.min(t.len() + 2), rule)?;
+        let grid = Grid::new(t[t.len() - 1]);
+        u.iter_mut().for_each(|u| *u = grid.round(*u));
         Ok(Spline::fit_with_values(
             &self.parameters,
             &self.positions,
@@ -372,7 +374,9 @@ fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
             still[i] = still[i - 1];
         }
     }
-    let t = centripetal(&still);
+    let mut t = centripetal(&still);
+    let grid = Grid::new(t.last().copied().unwrap_or(0.0));
+    t.iter_mut().for_each(|t| *t = grid.round(*t));
     if distinct(&t).len() > 1 {
         t
     } else {

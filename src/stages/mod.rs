@@ -121,6 +121,7 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
+        "signal.transfer" => signal::transfer_inputs(sequence, choice),
         _ if stage.starts_with("shape.") => shape::inputs(stage, sequence),
         _ => signal::inputs(stage, frames, choice),
     }
