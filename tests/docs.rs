@@ -30,7 +30,7 @@ fn the_table_of_engines_is_current() {
 fn examples(verb: &[&str]) -> String {
     let help = meshseq(&[verb, &["--help"]].concat());
     let (_, rest) = help
-        .split_once("Example")
+        .split_once("\nExample")
         .unwrap_or_else(|| panic!("{verb:?} has no example"));
     let (first, below) = rest.split_once('\n').unwrap_or((rest, ""));
     let inline = first.trim_start_matches('s').trim_start_matches(':').trim();

@@ -239,6 +239,7 @@ fn numbers(
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
+        "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
         "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
@@ -271,7 +272,7 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
-         ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],
@@ -288,6 +289,8 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         3 * v["n"].as_u64().unwrap_or(0) * v["V"].as_u64().unwrap_or(0),
         t("h"),
         t("mds"),
+        v["mds_steps"]["majorising"],
+        v["mds_steps"]["newton"],
         t("rbf"),
         t("g"),
         t("f"),

@@ -11,7 +11,7 @@ use super::f::{Spline, SplineError};
 use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
-use super::mds::{Dissimilarities, scale};
+use super::mds::{Dissimilarities, Steps, scale_counting};
 use super::parameters::{Grid, centripetal, distinct};
 use super::pins::{Pin, PinError, principal_start, validate_pins};
 use super::poses::{diameter, first_of_each};
@@ -117,6 +117,8 @@ pub struct Fit {
     pub representation: Representation,
     /// p_1 .. p_n.
     pub positions: Vec<Point>,
+    /// How many steps the scaling took.
+    pub steps: Steps,
     /// X, m x n.
     pub coordinates: Mat<f64>,
     /// Singular values of the centred frames.
@@ -187,6 +189,7 @@ fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
 pub(super) struct Base {
     shape: ShapeSignal,
     positions: Vec<Point>,
+    steps: Steps,
     diameter: f64,
     parameters: Vec<f64>,
     error_h: f64,
@@ -206,9 +209,9 @@ impl Base {
     /// From a shape signal already found, with its error (3).
     pub(super) fn from_shape(shape: ShapeSignal, error_h: f64, h: Duration, pins: &[Pin]) -> Self {
         let x = shape.coordinates.as_ref();
-        let (positions, mds) = timed(|| {
+        let ((positions, steps), mds) = timed(|| {
             let delta = Dissimilarities::new(x);
-            scale(&delta, &principal_start(x, pins), pins)
+            scale_counting(&delta, &principal_start(x, pins), pins)
         });
         let diameter = diameter(&positions);
         Self {
@@ -217,6 +220,7 @@ impl Base {
             negligible: 1e-12 * shape.coordinates.squared_norm_l2(),
             shape,
             positions,
+            steps,
             error_h,
             timings: Timings {
                 h,
@@ -345,6 +349,7 @@ impl Base {
                 basis: self.shape.basis,
             },
             positions: self.positions,
+            steps: self.steps,
             coordinates: self.shape.coordinates,
             singular_values: self.shape.singular_values,
             sites: attempt.sites,
