@@ -86,7 +86,7 @@ fn conversions_and_samples_do_not_depend_on_threads() {
     for name in ["a.npz", "a.pc2", "frames"] {
         same_bytes(name, |out| words(&format!("convert @jelly-small {out}")));
         same_bytes(name, |out| {
-            words(&format!("signal sample {rep} --count 61 -o {out}"))
+            words(&format!("signal sample {rep} --frames 61 -o {out}"))
         });
     }
     same_bytes("info.json", |out| {

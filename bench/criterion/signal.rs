@@ -13,7 +13,8 @@ use meshseq::signal::h::shape_signal;
 use meshseq::signal::knots::{KnotRule, knots};
 use meshseq::signal::mds::{Dissimilarities, scale};
 use meshseq::signal::parameters::centripetal;
-use meshseq::signal::pins::principal_start;
+use meshseq::signal::pins::{Pin, principal_start};
+use meshseq::signal::repin::Scaling;
 use meshseq::signal::sites::site_order;
 use rayon::prelude::*;
 
@@ -61,6 +62,35 @@ fn mds(c: &mut Criterion) {
         let start = principal_start(x.as_ref(), &[]);
         group.bench_function(BenchmarkId::new("frames", n), |b| {
             b.iter(|| scale(&Dissimilarities::new(x.as_ref()), &start, &[]));
+        });
+    }
+}
+
+/// One pin is dragged back and forth by 2% of the layout, and the layout follows from where it was.
+fn repin(c: &mut Criterion) {
+    let mut group = c.benchmark_group("repin");
+    for n in [24, 100, 204, 500, 1000] {
+        let (x, positions) = poses(n, 20.min(n - 1));
+        let pins = [0, n / 3, 2 * n / 3].map(|frame| Pin {
+            frame,
+            position: positions[frame],
+        });
+        let mut scaling =
+            Scaling::new(Dissimilarities::new(x.as_ref()), &positions, &pins).unwrap();
+        scaling.solve();
+        let reach = positions
+            .iter()
+            .flatten()
+            .fold(0.0f64, |r, x| r.max(x.abs()));
+        let mut side = 0.02 * reach;
+        group.bench_function(BenchmarkId::new("a pin moves, frames", n), |b| {
+            b.iter(|| {
+                let mut pin = pins[1];
+                pin.position[0] += side;
+                side = -side;
+                scaling.move_pin(pin).unwrap();
+                scaling.solve()
+            });
         });
     }
 }
@@ -177,6 +207,6 @@ fn quick() -> Criterion {
 criterion_group! {
     name = benches;
     config = quick();
-    targets = h, mds, sites_and_rbf, f, psi, whole
+    targets = h, mds, repin, sites_and_rbf, f, psi, whole
 }
 criterion_main!(benches);

@@ -1,29 +1,30 @@
-//! `signal fit` and `signal sample`.
+//! `signal fit`; the other verbs of signals are in files of their own.
 
-use std::io::Read;
+mod design;
+mod edit;
+mod result;
+mod sample;
+mod tables;
+mod transfer;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use faer::MatRef;
 use serde_json::json;
 
+use self::tables::placed_frames;
 use super::output::{check_place, draft_json, say};
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
-use crate::sequence::format::write;
-use crate::shape::{SpaceKind, patches, prepare};
+use crate::shape::{SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
-use crate::signal::file::{Stored, load, save};
+use crate::signal::file::{Stored, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
 use crate::signal::in_space::{SpaceFit, fit_in_space, fit_in_space_to_rms};
 use crate::signal::knots::KnotRule;
 use crate::signal::pins::{Pin, validate_pins};
-
-/// More frames are a mistake.
-const MOST_FRAMES: usize = 10_000_000;
-/// More pins than any plane of poses takes; a longer file is none of pins.
-const LONGEST_PINS: u64 = 64 << 20;
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -32,9 +33,18 @@ pub enum Signal {
         after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json"
     )]
     Fit(FitVerb),
-    /// Frames of a representation at any times
-    #[command(after_help = "Example: meshseq signal sample gallop.npz --count 48 -o twice-as-many")]
-    Sample(SampleVerb),
+    /// Frames of a representation at any times: other rates, slow and fast motion
+    #[command(after_help = sample::EXAMPLES)]
+    Sample(sample::SampleVerb),
+    /// Change the time signal: move control points, add loops, delete, repeat or reverse frames
+    #[command(after_help = edit::EXAMPLES)]
+    Edit(edit::EditVerb),
+    /// Move a motion to another mesh by examples that pair the two
+    #[command(after_help = transfer::EXAMPLES)]
+    Transfer(transfer::TransferVerb),
+    /// A sequence from poses placed in the plane and a curve sketched among them
+    #[command(after_help = design::EXAMPLES)]
+    Design(design::DesignVerb),
 }
 
 impl Signal {
@@ -42,6 +52,9 @@ impl Signal {
         match self {
             Self::Fit(verb) => verb.run(),
             Self::Sample(verb) => verb.run(),
+            Self::Edit(verb) => verb.run(),
+            Self::Transfer(verb) => verb.run(),
+            Self::Design(verb) => verb.run(),
         }
     }
 }
@@ -91,20 +104,10 @@ impl FitVerb {
             .parse()
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
         let space: SpaceKind = self.space.parse()?;
-        if let Some(out) = self
-            .out
-            .as_ref()
-            .filter(|out| out.extension().is_none_or(|e| e != "npz"))
-        {
-            return Err(format!(
-                "{}: a representation is one .npz file; name it so",
-                out.display()
-            )
-            .into());
+        if let Some(out) = &self.out {
+            check_representation_place(out)?;
         }
-        for path in self.out.iter().chain(&self.json) {
-            check_place(path)?;
-        }
+        self.json.as_deref().map_or(Ok(()), check_place)?;
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
@@ -114,14 +117,8 @@ impl FitVerb {
             None => Vec::new(),
         };
         let reference = self.reference(&sequence, space)?;
-        let patches = match space {
-            SpaceKind::Patch => patches::choose(
-                sequence.connectivity().clone(),
-                &reference,
-                sequence.positions(),
-            )?,
-            _ => Vec::new(),
-        };
+        let (mesh, frames) = (sequence.connectivity(), sequence.positions());
+        let patches = patches_for(space, mesh, &reference, frames)?;
         let fitted = self.fit(&sequence, space, &reference, &patches, knots, pins)?;
         let numbers = numbers(&sequence, &fitted, space, knots);
         // Whatever can fail comes before the first file gets its name.
@@ -247,6 +244,7 @@ fn numbers(
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
+        "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
         "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
@@ -279,7 +277,7 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
-         ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],
@@ -296,6 +294,8 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         3 * v["n"].as_u64().unwrap_or(0) * v["V"].as_u64().unwrap_or(0),
         t("h"),
         t("mds"),
+        v["mds_steps"]["majorising"],
+        v["mds_steps"]["newton"],
         t("rbf"),
         t("g"),
         t("f"),
@@ -304,116 +304,16 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
 
 /// Rows `frame,x,y` below a header line, with frames of 1 to n.
 fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
-    let place = path.display();
-    let file = std::fs::File::open(path).map_err(|e| format!("{place}: cannot read pins: {e}"))?;
-    // One byte more than allowed tells a file that is too long; a device never ends.
-    let mut text = String::new();
-    file.take(LONGEST_PINS + 1)
-        .read_to_string(&mut text)
-        .map_err(|e| format!("{place}: cannot read pins: {e}"))?;
-    if text.len() as u64 > LONGEST_PINS {
-        return Err(
-            format!("{place}: more than {LONGEST_PINS} bytes, which pins never have").into(),
-        );
-    }
-    let pins = parse_pins(&text).map_err(|e| {
-        format!("{place}: {e}; expected a line `frame,x,y` and then one such row a pin, frames counted from 1")
-    })?;
-    validate_pins(&pins, n).map_err(|e| format!("{place}: {e}"))?;
+    let pins = placed_frames(path, "pins")?;
+    validate_pins(&pins, n).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(pins)
 }
 
-fn parse_pins(text: &str) -> Result<Vec<Pin>, Failure> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let header = reader.headers()?;
-    if header != ["frame", "x", "y"].as_slice() {
-        let found: Vec<String> = header.iter().map(shortened).collect();
-        return Err(format!("the first line is `{}`", found.join(",")).into());
+/// An error where a representation could not be written: it is one .npz file.
+fn check_representation_place(path: &Path) -> Result<(), Failure> {
+    if path.extension().is_none_or(|e| e != "npz") {
+        let place = path.display();
+        return Err(format!("{place}: a representation is one .npz file; name it so").into());
     }
-    let mut pins = Vec::new();
-    for row in reader.deserialize() {
-        let (frame, x, y): (usize, f64, f64) = row?;
-        let frame = frame.checked_sub(1).ok_or("a pin names frame 0")?;
-        pins.push(Pin {
-            frame,
-            position: [x, y],
-        });
-    }
-    Ok(pins)
-}
-
-/// The beginning of what may be very long.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
-}
-
-#[derive(Args)]
-pub struct SampleVerb {
-    /// A representation that `signal fit` wrote
-    representation: PathBuf,
-    /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
-    #[arg(long, value_name = "N", conflicts_with = "times", allow_negative_numbers = true, value_parser = whole("1 or more"))]
-    count: Option<usize>,
-    /// Frame times in [1, n], separated by commas
-    #[arg(
-        long,
-        value_name = "T,T,..",
-        value_delimiter = ',',
-        allow_negative_numbers = true
-    )]
-    times: Vec<f64>,
-    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
-    #[arg(short, long, value_name = "OUT")]
-    out: PathBuf,
-}
-
-impl SampleVerb {
-    pub fn run(self) -> Outcome {
-        let stored = load(&self.representation)?;
-        let n = stored.representation.time.frame_count() as f64;
-        let times = self.frame_times(n)?;
-        check_memory(times.len(), stored.representation.dimension())?;
-        let frames = stored.sample(&times);
-        let frames = frames.map_err(|e| format!("{}: {e}", self.representation.display()))?;
-        let sequence = Sequence::new(stored.connectivity, times.len(), frames)
-            .map_err(|e| format!("{}: sampled, {e}", self.representation.display()))?;
-        write(&sequence, &self.out)?;
-        say(&format!("{}: {} frames", self.out.display(), times.len()));
-        Ok(true)
-    }
-
-    fn frame_times(&self, n: f64) -> Result<Vec<f64>, Failure> {
-        if let Some(t) = self.times.iter().find(|t| !(1.0..=n).contains(*t)) {
-            return Err(format!("--times {t}: expected frame times from 1 to {n}").into());
-        }
-        if !self.times.is_empty() {
-            return Ok(self.times.clone());
-        }
-        let count = self.count.unwrap_or(n as usize);
-        if count == 0 || count > MOST_FRAMES {
-            return Err(format!("--count {count}: expected 1 to {MOST_FRAMES}").into());
-        }
-        let step = if count > 1 {
-            (n - 1.0) / (count - 1) as f64
-        } else {
-            0.0
-        };
-        Ok((0..count).map(|i| (1.0 + i as f64 * step).min(n)).collect())
-    }
-}
-
-/// An error where that many frames of d numbers do not fit into memory.
-fn check_memory(frames: usize, d: usize) -> Result<(), Failure> {
-    let numbers = frames.checked_mul(d);
-    let fits = numbers.is_some_and(|count| Vec::<f64>::new().try_reserve_exact(count).is_ok());
-    if fits {
-        return Ok(());
-    }
-    let gigabytes = frames as f64 * d as f64 * 8e-9;
-    Err(format!(
-        "{frames} frames of {d} numbers, {gigabytes:.0} GB, do not fit into memory; sample fewer at a time with --times"
-    )
-    .into())
+    Ok(check_place(path)?)
 }

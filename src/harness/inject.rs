@@ -208,6 +208,27 @@ faults! {
             let m = row_length(inputs, "g");
             numbers(inputs, "g", |g| { let at = g.len() - 2 * m; g[at..].fill(0.0) });
         });
+    "insert-unblended" in "signal.insert_knots": "a control point of the old curve in place of a blended one",
+        Outputs(|inputs, out| {
+            let old = inputs.points("control").map(|c| c[1]).unwrap_or_default();
+            numbers(out, "control", |c| c[2..4].copy_from_slice(&old));
+        });
+    "insert-dropped" in "signal.insert_knots": "the last new knot left out",
+        Inputs(|inputs| shorten(inputs, "insert", 1));
+    "insert-curve" in "signal.insert_knots": "control points of the curve moved a millionth",
+        Inputs(|inputs| numbers(inputs, "control", stretch));
+    "insert-off-by-one" in "signal.insert_knots": "the first two control points swapped",
+        Outputs(|_, out| numbers(out, "control", |c| swap_rows(c, 2, 0, 1)));
+    "transfer-relative" in "signal.transfer": "coordinates a millionth too long",
+        Outputs(|_, out| numbers(out, "X", stretch));
+    "transfer-wrong-example" in "signal.transfer": "the second and third example of the target swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "R"); numbers(inputs, "R", |r| swap_rows(r, d, 1, 2)) });
+    "transfer-other-reference" in "signal.transfer": "the second example in place of the reference pose",
+        Inputs(|inputs| { let d = row_length(inputs, "Q"); numbers(inputs, "Q", |q| q.copy_within(d..2 * d, 0)) });
+    "transfer-example-dropped" in "signal.transfer": "the last example left out",
+        Inputs(|inputs| { let (d, e) = (row_length(inputs, "Q"), row_length(inputs, "R")); shorten(inputs, "Q", d); shorten(inputs, "R", e) });
+    "transfer-frames" in "signal.transfer": "frames a millionth too large",
+        Outputs(|_, out| numbers(out, "W", stretch));
     "signal-other-knots" in "signal": "the other averaging rule",
         Inputs(other_rule);
     "signal-site-dropped" in "signal": "one site fewer",

@@ -155,6 +155,21 @@ tolerances! {
         "formula" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
         "frame_difference" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
     }
+    "signal.insert_knots" {
+        "knots" <= 0.0, "old and new knots, merged";
+        "formula" <= 1e-13, "values are those of the new control points";
+        "curve" <= 1e-13, "the curve stays: averages of control points, over their extent";
+        "u_difference" <= 0.0, "old and new knots, merged";
+        "control_difference" <= 1e-12, "one set of control points keeps the curve; other ways to find it round in another order";
+        "value_difference" <= 1e-12, "the same curve";
+    }
+    "signal.transfer" {
+        "stationarity" <= 1e-13, "a least-squares residual is orthogonal to the examples, over the norms of both";
+        "formula" <= 1e-13, "frames are sums of examples, over their greatest number";
+        "examples" <= 1e-9, "an example becomes its partner: eps times the condition of the examples, below 1e5 (issue 4)";
+        "coordinate_difference" <= 1e-9, "least squares by another factorisation: eps times the condition of the examples, squared by the normal equations";
+        "frame_difference" <= 1e-9, "as coordinates";
+    }
     "signal" {
         "claimed_error_psi" <= 1e-9, "error (2) again from the frames";
         "claimed_error_h" <= 1e-10, "error (3) again from singular values";

@@ -172,34 +172,66 @@ pub fn prepare_for(
 ) -> Result<Box<dyn Space>, ShapeError> {
     let len = 3 * connectivity.vertex_count();
     let reference = frames.get(..len).unwrap_or(frames);
-    let patches = match kind {
-        SpaceKind::Patch => patches::choose(connectivity.clone(), reference, frames)?,
-        _ => Vec::new(),
-    };
+    let patches = patches_for(kind, connectivity, reference, frames)?;
     prepare(kind, connectivity.clone(), reference, &patches)
+}
+
+/// The patches that [`prepare`] wants for this space, found from these frames; none for spaces that have none.
+pub fn patches_for(
+    kind: SpaceKind,
+    connectivity: &Arc<Connectivity>,
+    reference: &[f64],
+    frames: &[f64],
+) -> Result<Vec<i64>, ShapeError> {
+    match kind {
+        SpaceKind::Patch => patches::choose(connectivity.clone(), reference, frames),
+        _ => Ok(Vec::new()),
+    }
 }
 
 /// The vectors of n frames (n x 3V positions, frame after frame) as the columns of a d x n matrix. Frames run in parallel, then branches are
 /// chosen; the result does not depend on the number of threads.
 pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
+    let mut z = encode_each(space, frames)?;
+    let mut columns = columns_mut(&mut z);
+    for i in 1..columns.len() {
+        let (before, after) = columns.split_at_mut(i);
+        space.unwrap(before[i - 1], after[0]);
+    }
+    Ok(z)
+}
+
+/// The same for examples, of which the first shows a reference pose: branches are those nearest to it.
+pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
+    let mut z = encode_each(space, frames)?;
+    if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {
+        others.iter_mut().for_each(|z| {
+            space.unwrap(first, z);
+            space.unwrap_over_surface(z);
+        });
+    }
+    Ok(z)
+}
+
+/// The columns of a matrix of our own, which are contiguous.
+fn columns_mut(z: &mut Mat<f64>) -> Vec<&mut [f64]> {
+    let columns = z.col_iter_mut();
+    let columns = columns.filter_map(|column| column.try_as_col_major_mut());
+    columns.map(|column| column.as_slice_mut()).collect()
+}
+
+/// Every frame's vector on its own, with angles in their principal branches.
+fn encode_each(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let len = space.frame_len().max(1);
     let n = frames.len() / len;
     reference::check_len("frames", frames, n * len)?;
     let mut z = Mat::zeros(space.dimension(), n);
-    // The columns of a matrix of our own are contiguous.
-    let columns = z
-        .col_iter_mut()
-        .filter_map(|column| column.try_as_col_major_mut());
-    let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
+    let mut columns = columns_mut(&mut z);
     let both = columns.par_iter_mut().zip(frames.par_chunks_exact(len));
     first_error(
         both.enumerate()
             .map(|(i, (z, frame))| space.encode(frame, z).map_err(|e| e.of_frame(i))),
     )?;
-    for i in 1..n {
-        let (before, after) = columns.split_at_mut(i);
-        space.unwrap(before[i - 1], after[0]);
-    }
     Ok(z)
 }
 

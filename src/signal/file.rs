@@ -32,6 +32,8 @@ use crate::sequence::format::{FormatError, npz};
 use crate::shape::reference::check_len;
 use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare};
 
+/// Frames whose vectors in the shape space are held at a time, for they are several times as long as positions.
+const AT_A_TIME: usize = 32;
 const FORMAT: &str = "meshseq signal 1";
 
 /// A representation and the mesh it deforms.
@@ -56,7 +58,12 @@ impl Stored {
         if self.space == SpaceKind::Vertex {
             return Ok(self.representation.evaluate(times));
         }
-        sample_in_space(&*self.prepare()?, &self.representation, times)
+        let space = self.prepare()?;
+        let mut frames = Vec::with_capacity(times.len() * space.frame_len());
+        for some in times.chunks(AT_A_TIME) {
+            frames.extend(sample_in_space(&*space, &self.representation, some)?);
+        }
+        Ok(frames)
     }
 
     fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {

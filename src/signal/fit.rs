@@ -11,8 +11,8 @@ use super::f::{Spline, SplineError};
 use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
-use super::mds::{Dissimilarities, scale};
-use super::parameters::{centripetal, distinct};
+use super::mds::{Dissimilarities, Steps, scale_counting};
+use super::parameters::{Grid, centripetal, distinct};
 use super::pins::{Pin, PinError, principal_start, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
@@ -130,6 +130,8 @@ pub struct Fit {
     pub representation: Representation,
     /// p_1 .. p_n.
     pub positions: Vec<Point>,
+    /// How many steps the scaling took.
+    pub steps: Steps,
     /// X, m x n.
     pub coordinates: Mat<f64>,
     /// Singular values of the centred frames.
@@ -200,6 +202,7 @@ fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
 pub(super) struct Base {
     shape: ShapeSignal,
     positions: Vec<Point>,
+    steps: Steps,
     diameter: f64,
     parameters: Vec<f64>,
     error_h: f64,
@@ -219,9 +222,9 @@ impl Base {
     /// From a shape signal already found, with its error (3).
     pub(super) fn from_shape(shape: ShapeSignal, error_h: f64, h: Duration, pins: &[Pin]) -> Self {
         let x = shape.coordinates.as_ref();
-        let (positions, mds) = timed(|| {
+        let ((positions, steps), mds) = timed(|| {
             let delta = Dissimilarities::new(x);
-            scale(&delta, &principal_start(x, pins), pins)
+            scale_counting(&delta, &principal_start(x, pins), pins)
         });
         let diameter = diameter(&positions);
         Self {
@@ -230,6 +233,7 @@ impl Base {
             negligible: 1e-12 * shape.coordinates.squared_norm_l2(),
             shape,
             positions,
+            steps,
             error_h,
             timings: Timings {
                 h,
@@ -339,7 +343,9 @@ impl Base {
 
     fn spline(&self, k: usize, rule: KnotRule) -> Result<(Spline, Vec<Point>), FitError> {
         let t = distinct(&self.parameters);
-        let u = knots(&t, k.min(t.len() + 2), rule)?;
+        let mut u = knots(&t, k.min(t.len() + 2), rule)?;
+        let grid = Grid::new(t[t.len() - 1]);
+        u.iter_mut().for_each(|u| *u = grid.round(*u));
         Ok(Spline::fit_with_values(
             &self.parameters,
             &self.positions,
@@ -356,6 +362,7 @@ impl Base {
                 basis: self.shape.basis,
             },
             positions: self.positions,
+            steps: self.steps,
             coordinates: self.shape.coordinates,
             singular_values: self.shape.singular_values,
             sites: attempt.sites,
@@ -385,7 +392,9 @@ fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
             still[i] = still[i - 1];
         }
     }
-    let t = centripetal(&still);
+    let mut t = centripetal(&still);
+    let grid = Grid::new(t.last().copied().unwrap_or(0.0));
+    t.iter_mut().for_each(|t| *t = grid.round(*t));
     if distinct(&t).len() > 1 {
         t
     } else {

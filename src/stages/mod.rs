@@ -135,6 +135,7 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
+        "signal.transfer" => signal::transfer_inputs(sequence, choice),
         _ if stage.starts_with("shape.poisson_") => poisson::inputs(sequence),
         _ if stage.starts_with("shape.") => shape::inputs(stage, sequence, choice),
         _ if choice.space == SpaceKind::Vertex => signal::inputs(stage, frames, choice),

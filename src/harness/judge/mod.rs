@@ -14,6 +14,7 @@ mod scaling;
 mod shape;
 mod sparse;
 mod time;
+mod transfer;
 
 use crate::arrays::{ArrayError, Bundle};
 
@@ -53,6 +54,8 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.spline" => (time::spline_own, time::spline_against),
         "signal.rho" => (time::rho_own, time::rho_against),
         "signal.psi" => (chain::psi_own, chain::psi_against),
+        "signal.insert_knots" => (time::more_knots_own, time::more_knots_against),
+        "signal.transfer" => (transfer::own, transfer::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };
