@@ -3,7 +3,8 @@
 `seconds` is the work on the frames, for each of which trimesh builds its mesh and everything that follows from it, as its users do.
 
 Signs. trimesh's angle is that between two normals, unsigned; it is convex where the corner of g that f has not lies below the plane of f: there the
-contract's angle is positive. Where the two run along the edge in the same direction, the contract turns the normal of g over: pi minus trimesh's angle.
+contract's angle is positive. Where the two run along the edge in the same direction, the contract turns the normal of g over: pi minus trimesh's
+angle.
 
 Known differences and limits of trimesh:
 - the angle is an arccosine: near 0 and near pi it is good to about 2e-8 only, elsewhere to rounding;
