@@ -9,7 +9,7 @@ angle.
 Known differences and limits of trimesh:
 - the angle is an arccosine: near 0 and near pi it is good to about 2e-8 only, elsewhere to rounding;
 - face_adjacency leaves out edges with more than two triangles: unsupported;
-- a triangle of less than about 1e-12 in area has no normal to it, whatever the unit: unsupported.
+- a triangle of less than about 1e-13 in area has no normal to it, whatever the unit: unsupported.
 Components, degenerate triangles and centres are those of shape_mesh.py; the rotation of a component is scipy.linalg.polar's.
 """
 
