@@ -1,6 +1,6 @@
 // Stage shape.halfway by CGAL: Surface_mesh_deformation with the energy SPOKES_AND_RIMS (Chao, Pinkall, Sanan, Schroeder 2010): for each vertex, the
-// cotangent-weighted edges of its triangles against one rotation. At every step from `start` (see PROTOCOL.md) CGAL alternates positions and rotations
-// `iterations` times; at the last, until `iterations` of them move no vertex by more than `still` of the diagonal, `most` at most, as such
+// cotangent-weighted edges of its triangles against one rotation. At every step from `start` (see PROTOCOL.md) CGAL alternates positions and
+// rotations `iterations` times; at the last, until `iterations` of them move no vertex by more than `still` of the diagonal, `most` at most, as such
 // alternations end slowly. CGAL's own test, of the energy, ends much earlier.
 //
 // What it has not got is said: components without a handle, degenerate triangles (their cotangents are infinite), and surfaces that are no oriented
@@ -156,7 +156,8 @@ static wire::Job prepare(const std::string& stage, const wire::Message& inputs) 
     const wire::Reals &start = wire::f64(inputs, "start", 2), &targets = wire::f64(inputs, "targets", 2);
     const wire::Integers &faces = wire::i64(inputs, "F", 2), &handles = wire::i64(inputs, "handles", 1);
     const std::uint64_t count = inputs.at("start").shape[0];
-    if (inputs.at("start").shape[1] != 3 || inputs.at("F").shape[1] != 3 || targets.size() != 3 * handles.size() || inputs.at("targets").shape[1] != 3)
+    const auto columns = [&](const char* name) { return inputs.at(name).shape[1]; };
+    if (columns("start") != 3 || columns("F") != 3 || columns("targets") != 3 || targets.size() != 3 * handles.size())
         throw std::invalid_argument("start is (V,3), F (F,3), handles (H) and targets (H,3)");
     for (const wire::Integers* indices : {&faces, &handles})
         for (std::int64_t index : *indices)

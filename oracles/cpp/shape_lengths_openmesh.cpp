@@ -69,7 +69,7 @@ public:
         for (std::size_t f = 0; f < faces.size(); f += 3) {
             corners_.push_back({int(faces[f]), int(faces[f + 1]), int(faces[f + 2])});
             if (!mesh_.add_face(vertices[faces[f]], vertices[faces[f + 1]], vertices[faces[f + 2]]).is_valid())
-                throw wire::Unsupported("OpenMesh cannot hold triangle " + std::to_string(f / 3) + ": an edge or a vertex is not manifold, or not oriented");
+                throw wire::Unsupported("OpenMesh cannot hold triangle " + std::to_string(f / 3) + ": not manifold or not oriented there");
         }
         for (const auto face : mesh_.faces()) solid_.push_back(!is_degenerate(mesh_, face));
         components_ = std::make_unique<Components>(mesh_, solid_);

@@ -1,10 +1,11 @@
-// Stages shape.poisson_factor and shape.poisson_solve by CHOLMOD with its defaults: it orders by AMD, tries METIS where that is not good enough, keeps the
-// better, and takes the supernodal method where the operations are many for the entries (more than 40 each), else the simplicial one (LDL').
+// Stages shape.poisson_factor and shape.poisson_solve by CHOLMOD with its defaults: it orders by AMD, tries METIS where that is not good enough,
+// keeps the better, and takes the supernodal method where the operations are many for the entries (more than 40 each), else the simplicial one
+// (LDL').
 //
 // `seconds` of a factorisation is cholmod_analyze and cholmod_factorize, of a solve cholmod_solve2 with workspace that is kept between calls.
 // The supernodal method lives off the BLAS: Debian's own is the reference BLAS unless another is installed (libopenblas0-pthread). Measure with care.
-// scikit-sparse is not among the oracles: it wraps this same library, so it would be no other witness; it has no wheels, and 0.5 does not build with the
-// SuiteSparse 5.12 of Debian 12.
+// scikit-sparse is not among the oracles: it wraps this same library, so it would be no other witness; it has no wheels, and 0.5 does not build
+// with the SuiteSparse 5.12 of Debian 12.
 
 #include <cholmod.h>
 
@@ -27,7 +28,8 @@ public:
 
         cholmod_triplet* triplets = cholmod_allocate_triplet(n_, n_, rows.size(), -1, CHOLMOD_REAL, &common_);  // -1: the lower triangle
         for (std::size_t e = 0; e < rows.size(); ++e) {
-            if (cols[e] < 0 || cols[e] > rows[e] || std::uint64_t(rows[e]) >= n_) throw std::invalid_argument("an entry is not in the lower triangle");
+            if (cols[e] < 0 || cols[e] > rows[e] || std::uint64_t(rows[e]) >= n_)
+                throw std::invalid_argument("an entry is not in the lower triangle");
             static_cast<int*>(triplets->i)[e] = int(rows[e]);
             static_cast<int*>(triplets->j)[e] = int(cols[e]);
             static_cast<double*>(triplets->x)[e] = values[e];

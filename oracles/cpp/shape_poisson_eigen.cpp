@@ -41,7 +41,8 @@ static std::shared_ptr<System> read(const wire::Message& inputs) {
 
     std::vector<Eigen::Triplet<double>> entries;
     for (std::size_t e = 0; e < rows.size(); ++e) {
-        if (cols[e] < 0 || cols[e] > rows[e] || std::uint64_t(rows[e]) >= n) throw std::invalid_argument("an entry is not in the lower triangle");
+        if (cols[e] < 0 || cols[e] > rows[e] || std::uint64_t(rows[e]) >= n)
+            throw std::invalid_argument("an entry is not in the lower triangle");
         entries.emplace_back(int(rows[e]), int(cols[e]), values[e]);
     }
     auto system = std::make_shared<System>();

@@ -25,7 +25,7 @@ def close(name, found, expected, tolerance=1e-11):
 
 
 class Oracle:
-    """A running oracle (its program, then its arguments) and its stage. Use it in a `with`: leaving checks that it ends well when its input closes."""
+    """A running oracle (its program, then its arguments) and its stage. In a `with`: leaving checks that it ends well."""
 
     def __init__(self, program, stage):
         self.program, self.stage = program, stage

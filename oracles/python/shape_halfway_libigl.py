@@ -1,7 +1,7 @@
-"""shape.halfway by libigl: arap_precomputation and arap_solve, whose energy on a surface in space is that of spokes and rims (Chao, Pinkall, Sanan, Schroeder
-2010): for each vertex, the cotangent-weighted edges of its triangles against one rotation. At every step from `start` (see PROTOCOL.md) libigl alternates
-rotations and positions ITERATIONS times; at the last, until ITERATIONS of them move no vertex by more than STILL of the diagonal, MOST at most, as
-such alternations end slowly: a tenth of STILL changed the mean edge length of a horse and a dancer by 3e-6 of it.
+"""shape.halfway by libigl: arap_precomputation and arap_solve, whose energy on a surface in space is that of spokes and rims (Chao, Pinkall,
+Sanan, Schroeder 2010): for each vertex, the cotangent-weighted edges of its triangles against one rotation. At every step from `start` (see
+PROTOCOL.md) libigl alternates rotations and positions ITERATIONS times; at the last, until ITERATIONS of them move no vertex by more than STILL
+of the diagonal, MOST at most, as such alternations end slowly: a tenth of STILL changed the mean edge length of a horse and a dancer by 3e-6 of it.
 
 libigl fits rotations in single precision (its polar_svd3x3): even what is at rest moves by 1e-7 of the diagonal.
 What it has not got is said: components without a handle, degenerate triangles (their cotangents are infinite). Unlike CGAL it takes any surface.

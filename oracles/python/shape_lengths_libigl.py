@@ -3,10 +3,10 @@ each component.
 
 `seconds` is the work on the frames: edges and flaps depend on the faces alone and are found before.
 
-libigl's bindings have no dihedral angle of a surface: it is atan2 of numpy on libigl's normals. edge_flaps numbers the flaps by the direction in which
-they run along the edge, and the angle is the same from either flap, so nothing is left to reconcile where both run in opposite directions. It has
-room for one triangle an edge and direction: where there are more, it forgets one (which is_edge_manifold does not notice), so they are unsupported.
-Components, degenerate triangles and centres are those of shape_mesh.py.
+libigl's bindings have no dihedral angle of a surface: it is atan2 of numpy on libigl's normals. edge_flaps numbers the flaps by the direction in
+which they run along the edge, and the angle is the same from either flap, so nothing is left to reconcile where both run in opposite directions.
+It has room for one triangle an edge and direction: where there are more, it forgets one (which is_edge_manifold does not notice), so they are
+unsupported. Components, degenerate triangles and centres are those of shape_mesh.py.
 """
 
 import platform

@@ -3,12 +3,13 @@
 `seconds` is the work on the frames, for each of which trimesh builds its mesh and everything that follows from it, as its users do.
 
 Signs. trimesh's angle is that between two normals, unsigned; it is convex where the corner of g that f has not lies below the plane of f: there the
-contract's angle is positive. Where the two run along the edge in the same direction, the contract turns the normal of g over: pi minus trimesh's angle.
+contract's angle is positive. Where the two run along the edge in the same direction, the contract turns the normal of g over: pi minus trimesh's
+angle.
 
 Known differences and limits of trimesh:
 - the angle is an arccosine: near 0 and near pi it is good to about 2e-8 only, elsewhere to rounding;
 - face_adjacency leaves out edges with more than two triangles: unsupported;
-- a triangle of less than about 1e-12 in area has no normal to it, whatever the unit: unsupported.
+- a triangle of less than about 1e-13 in area has no normal to it, whatever the unit: unsupported.
 Components, degenerate triangles and centres are those of shape_mesh.py; the rotation of a component is scipy.linalg.polar's.
 """
 

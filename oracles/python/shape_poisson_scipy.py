@@ -1,5 +1,5 @@
-"""shape.poisson_factor and shape.poisson_solve by SuperLU (scipy.sparse.linalg.splu): an LU factorisation of both triangles, ordered by minimum degree on
-A^T + A, without pivoting off the diagonal. It does about twice the work of a Cholesky factorisation.
+"""shape.poisson_factor and shape.poisson_solve by SuperLU (scipy.sparse.linalg.splu): an LU factorisation of both triangles, ordered by minimum
+degree on A^T + A, without pivoting off the diagonal. It does about twice the work of a Cholesky factorisation.
 """
 
 import numpy as np

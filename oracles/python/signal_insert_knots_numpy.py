@@ -1,6 +1,6 @@
-"""signal.insert_knots by numpy, all knots at once and no Boehm: control point i of a cubic spline is the blossom (polar form) of any of its pieces that
-touch it at knots i+1, i+2, i+3 (Ramshaw 1989), so the new control points are blossoms of the old curve at three new knots each. The values are blossoms
-of the new curve at three times the same parameter.
+"""signal.insert_knots by numpy, all knots at once and no Boehm: control point i of a cubic spline is the blossom (polar form) of any of its
+pieces that touch it at knots i+1, i+2, i+3 (Ramshaw 1989), so the new control points are blossoms of the old curve at three new knots each. The
+values are blossoms of the new curve at three times the same parameter.
 """
 
 import platform

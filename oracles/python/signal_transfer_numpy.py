@@ -1,5 +1,5 @@
-"""signal.transfer by numpy, section 4.3: least squares by SVD (numpy.linalg.lstsq, LAPACK gelsd), which takes the solution of least norm where examples are
-dependent; or with the argument `normal` by the paper's normal equation, H^T H X = H^T Y^T, and a Cholesky factorisation.
+"""signal.transfer by numpy, section 4.3: least squares by SVD (numpy.linalg.lstsq, LAPACK gelsd), which takes the solution of least norm where
+examples are dependent; or with the argument `normal` by the paper's normal equation, H^T H X = H^T Y^T, and a Cholesky factorisation.
 
 The normal equation squares the condition: examples whose condition is above 1e6 are unsupported by `normal`, dependent ones among them.
 """

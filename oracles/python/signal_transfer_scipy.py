@@ -1,5 +1,5 @@
-"""signal.transfer by SciPy, section 4.3: scipy.linalg.lstsq with LAPACK gelsy, a QR factorisation with column pivoting, completed to the solution of least
-norm where examples are dependent.
+"""signal.transfer by SciPy, section 4.3: scipy.linalg.lstsq with LAPACK gelsy, a QR factorisation with column pivoting, completed to the
+solution of least norm where examples are dependent.
 
 gelsy finds the rank by an estimate of the condition of R, not by singular values: near the contract's 1e-10 it may decide otherwise.
 """

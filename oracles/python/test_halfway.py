@@ -12,7 +12,7 @@ STILL = 5e-3  # for a tube 19 long: the engines end when 10 iterations move noth
 
 
 def tube(rings, angle=0.0):
-    """Rings of unit distance and radius 1.5 around a segment, or around an arc of the same length that turns by `angle` about +y; open at its ends."""
+    """Rings of unit distance and radius 1.5 around a segment, or an arc of the same length that turns by `angle` about +y; open."""
     turn = angle * np.arange(rings)[:, None] / (rings - 1)
     radius = (rings - 1) / angle if angle else 1.0
     zero = np.zeros_like(turn)

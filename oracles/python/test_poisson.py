@@ -1,5 +1,5 @@
-"""Closed forms for the oracles of shape.poisson_factor and shape.poisson_solve: Laplacians of paths and boxes, whose solutions are parabolas and sines.
-Run by test_oracles.py, and for the C++ oracles by ../cpp/test_wire.py.
+"""Closed forms for the oracles of shape.poisson_factor and shape.poisson_solve: Laplacians of paths and boxes, whose solutions are parabolas and
+sines. Run by test_oracles.py, and for the C++ oracles by ../cpp/test_wire.py.
 """
 
 import numpy as np

@@ -79,13 +79,15 @@ def check_gradient_encode(program, oracle, rng):
     x0, F = TETRAHEDRON
     for r in (SPIN, [0, 0, 0], [0, 3.1, 0], [1e-9, 0, 0]):
         moved = rigid(x0, r, SHIFT)
-        close(f"{program}: rotation vectors of a rigid motion by {np.linalg.norm(r):.2g}", encode(x0, F, moved), gradient_z(x0, [r] * 4, [still] * 4, moved))
+        name = f"{program}: rotation vectors of a rigid motion by {np.linalg.norm(r):.2g}"
+        close(name, encode(x0, F, moved), gradient_z(x0, [r] * 4, [still] * 4, moved))
     grown = 3 * rigid(x0, SPIN, SHIFT)
     close(f"{program}: turned and scaled", encode(x0, F, grown), gradient_z(x0, [SPIN] * 4, [[3, 3, 3, 0, 0, 0]] * 4, grown), 1e-10)
 
     flat, F = strip(2)
     pulled = flat @ np.array([[2.0, 0.5, 0], [0.5, 1, 0], [0, 0, 1]])  # area times 1.75, so the normal's column times its root
-    close(f"{program}: a pull in a plane", encode(flat, F, pulled), gradient_z(flat, [[0] * 3] * 4, [[2, 1, np.sqrt(1.75), 0, 0, RT2 / 2]] * 4, pulled))
+    six = [2, 1, np.sqrt(1.75), 0, 0, RT2 / 2]
+    close(f"{program}: a pull in a plane", encode(flat, F, pulled), gradient_z(flat, [[0] * 3] * 4, [six] * 4, pulled))
     upright = turning([0, np.pi / 2, 0]).T  # x to -z: the pull is then in y and z
     z = encode(flat @ upright, F, pulled @ upright)
     close(f"{program}: the order of the six", z, gradient_z(flat, [[0] * 3] * 4, [[np.sqrt(1.75), 1, 2, -RT2 / 2, 0, 0]] * 4, pulled @ upright))
@@ -245,7 +247,8 @@ def test_lengths_encode(rng):
             flat, F = strip(2)
             z = oracle.run(reference=flat, F=np.concatenate([F, NEEDLE]), frames=flat[None])["z"]
             close(f"shape_lengths_{library}: a degenerate triangle has lengths and no angles", z[0, 1:20:2], np.zeros(10), known.get("near", 1e-11))
-            check(f"shape_lengths_{library}: a collapsed triangle", oracle.status(reference=flat, F=F, frames=flat[None] * [1, 0, 1]) == "unsupported")
+            collapsed = oracle.status(reference=flat, F=F, frames=flat[None] * [1, 0, 1])
+            check(f"shape_lengths_{library}: a collapsed triangle", collapsed == "unsupported")
 
 
 def test_lengths_decode(rng):
@@ -312,7 +315,8 @@ def test_lric(rng):
         bow = np.array([[0, 1, 2], [0, 3, 4]]), np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, 1, 0]])
         d = oracle.run(reference=bow[1], F=bow[0], frames=bow[1][None])["z"]
         check("lric: triangles that only a vertex joins", oracle.status(**decode, reference=bow[1], F=bow[0], z=d) == "unsupported")
-        check("lric: a triangle that names a vertex twice", oracle.status(reference=right, F=np.array([[0, 1, 1]]), frames=right[None]) == "unsupported")
+        twice = oracle.status(reference=right, F=np.array([[0, 1, 1]]), frames=right[None])
+        check("lric: a triangle that names a vertex twice", twice == "unsupported")
 
 
 def test_patch(rng):
