@@ -2,18 +2,22 @@
 //!
 //! | file | what it shows |
 //! |---|---|
-//! | [`gallop`], [`control`], [`flag`], [`resampling`] | Figures 1, 2, 4 and 6 |
+//! | [`gallop`], [`control`], [`flag`] | Figures 1, 2 and 4 |
+//! | [`editing`], [`resampling`], [`transfer`], [`expressions`] | Figures 5 to 8 |
 //! | [`large_turns`] | halfway to a roll by up to 700 degrees, in every shape space (section 5) |
 //! | [`signals`] | curves and frames that several of them show |
 //! | [`render`] | triangle meshes as pictures |
 
 pub mod control;
+pub mod editing;
+pub mod expressions;
 pub mod flag;
 pub mod gallop;
 pub mod large_turns;
 pub mod render;
 pub mod resampling;
 pub mod signals;
+pub mod transfer;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -122,6 +126,9 @@ pub const ALL: &[(&str, Make)] = &[
     ("figure-1", gallop::exhibit),
     ("figure-2", control::exhibit),
     ("figure-4", flag::exhibit),
+    ("figure-5", editing::exhibit),
     ("figure-6", resampling::exhibit),
+    ("figure-7", transfer::exhibit),
+    ("figure-8", expressions::exhibit),
     ("large-turns", large_turns::exhibit),
 ];
