@@ -11,7 +11,8 @@ use super::knots::KnotRule;
 use super::pins::{Pin, validate_pins};
 use super::psi::Representation;
 use crate::linalg::dense::{FactorError, ThinSvd, thin_svd};
-use crate::linalg::kernels::{axpy, dot, norm_squared};
+use crate::linalg::kernels::{axpy, combine, dot, norm_squared};
+use crate::shape::{ShapeError, Space, encode_examples};
 
 /// Singular values of the example differences up to this share of the greatest count as 0: examples that depend on the others.
 const DEPENDENT: f64 = 1e-10;
@@ -40,6 +41,9 @@ pub enum TransferError {
     /// See [`FactorError`].
     #[error(transparent)]
     Factor(#[from] FactorError),
+    /// See [`ShapeError`].
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
     /// See [`FitError`].
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -256,13 +260,43 @@ pub fn frames_of_coordinates(
         .map(|i| {
             let x: Vec<f64> = coordinates.col(i).iter().copied().collect();
             let mut frame = offset.clone();
-            crate::linalg::kernels::combine(&x, |j| basis.col_as_slice(j), &mut frame);
+            combine(&x, |j| basis.col_as_slice(j), &mut frame);
             frame
         })
         .collect();
     Ok(Mat::from_fn(offset.len(), columns.len(), |a, i| {
         columns[i][a]
     }))
+}
+
+/// Rounds in which the branches of the angles follow what the examples show.
+const ROUNDS: usize = 3;
+
+/// Frames (n x 3V positions) as the columns of a d x n matrix, for transfer by these examples, of which `rest` (3V positions) is the first.
+///
+/// The branches of angles are at first those nearest to the reference pose and then those nearest to the least-squares combination of the examples. So a
+/// frame that is an example has the example's vector, and a motion that turns far has no jumps where a principal branch would have them.
+pub fn encode_motion(
+    space: &dyn Space,
+    rest: &[f64],
+    basis: &ExampleBasis,
+    frames: &[f64],
+) -> Result<Mat<f64>, TransferError> {
+    let z = encode_examples(space, &[rest, frames].concat())?;
+    let mut z = z.get(.., 1..).to_owned();
+    for _ in 0..ROUNDS {
+        let x = basis.coordinates(z.as_ref())?;
+        for i in 0..z.ncols() {
+            let mut nearest = basis.offset.clone();
+            combine(
+                x.col_as_slice(i),
+                |j| basis.basis.col_as_slice(j),
+                &mut nearest,
+            );
+            space.unwrap(&nearest, z.col_as_slice_mut(i));
+        }
+    }
+    Ok(z)
 }
 
 #[cfg(test)]

@@ -92,9 +92,9 @@ impl DesignVerb {
             },
             patches,
         };
-        let numbers = self.outputs.write(&stored, rest, numbers)?;
+        let numbers = self.outputs.write(&stored, &poses, numbers)?;
         say(&format!(
-            "{}: {} frames from {} poses in {} space; {} faces inside out",
+            "{}: {} frames from {} poses in {} space; {} faces newly inside out",
             self.outputs.out.display(),
             self.frames,
             places.len(),

@@ -42,19 +42,21 @@ impl Outputs {
         Ok(self.json.as_deref().map_or(Ok(()), check_place)?)
     }
 
-    /// Writes everything; `numbers` are those of the verb, to which faces that are inside out are added, counted against `rest`.
+    /// Writes everything; `numbers` are those of the verb, to which faces are added that are inside out beside the first of `examples` (3V positions each)
+    /// though they are not in any of the examples.
     pub fn write(
         &self,
         stored: &Stored,
-        rest: &[f64],
+        examples: &[f64],
         mut numbers: Value,
     ) -> Result<Value, Failure> {
         let n = stored.representation.time.frame_count();
         let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         let sequence = frames_at(stored, &times, Path::new("the new representation"))?;
-        let turned = turned_faces(&sequence, rest);
-        numbers["faces_turned"] = turned.iter().sum::<usize>().into();
-        numbers["faces_turned_in_a_frame"] = turned.iter().max().copied().unwrap_or(0).into();
+        let [before, turned] = turned_faces(&sequence, examples);
+        numbers["faces_turned"] = turned.iter().map(Vec::len).sum::<usize>().into();
+        numbers["faces_turned_in_examples"] = before[0].len().into();
+        numbers["turned"] = turned.into();
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
         write(&sequence, &self.out)?;
@@ -68,11 +70,22 @@ impl Outputs {
     }
 }
 
-/// How many faces of each frame are inside out, beside a frame that is not.
-fn turned_faces(sequence: &Sequence, rest: &[f64]) -> Vec<usize> {
-    let orientation = Orientation::new(rest, sequence.connectivity().faces());
+/// Faces that are inside out in an example (one list), and those that are in each frame but in no example.
+fn turned_faces(sequence: &Sequence, examples: &[f64]) -> [Vec<Vec<u32>>; 2] {
+    let d = sequence.dimension();
+    let orientation = Orientation::new(&examples[..d], sequence.connectivity().faces());
+    let mut before: Vec<u32> = examples
+        .chunks_exact(d)
+        .flat_map(|e| orientation.turned(e))
+        .collect();
+    before.sort_unstable();
+    before.dedup();
     let frames = 0..sequence.frame_count();
-    frames
-        .map(|i| orientation.turned(sequence.frame(i)).len())
-        .collect()
+    let newly = frames.map(|i| {
+        let mut turned = orientation.turned(sequence.frame(i));
+        turned.retain(|f| before.binary_search(f).is_err());
+        turned
+    });
+    let newly = newly.collect();
+    [vec![before], newly]
 }

@@ -9,15 +9,16 @@ use serde_json::json;
 use super::super::output::say;
 use super::super::{Failure, FrameChoice, Outcome, whole};
 use super::result::Outputs;
+use crate::harness::case::Frames;
 use crate::sequence::Sequence;
 use crate::sequence::dataset::open;
 use crate::sequence::format::npz;
-use crate::shape::{Space, SpaceKind, encode_all, encode_examples, patches_for, prepare};
+use crate::shape::{Space, SpaceKind, encode_examples, patches_for, prepare};
 use crate::signal::Point;
 use crate::signal::file::{Stored, load};
 use crate::signal::knots::KnotRule;
 use crate::signal::psi::Representation;
-use crate::signal::transfer::{ExampleBasis, replace_shape};
+use crate::signal::transfer::{ExampleBasis, encode_motion, replace_shape};
 
 pub const EXAMPLES: &str = "Examples:
   meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
@@ -38,7 +39,7 @@ pub struct TransferVerb {
     /// Reference poses of both meshes, one OBJ each, put before the examples
     #[arg(long, num_args = 2, value_names = ["A_OBJ", "B_OBJ"])]
     rest: Option<Vec<String>>,
-    /// Examples to take, 1-based, both ends in, such as 1..7
+    /// Examples to take, 1-based, both ends in, such as 1..7 or 2..5,8..10
     #[arg(
         long,
         value_name = "A..B",
@@ -133,9 +134,11 @@ impl TransferVerb {
             },
             patches: b.patches,
         };
-        let numbers = self.outputs.write(&stored, &target, numbers)?;
+        let numbers = self
+            .outputs
+            .write(&stored, b.sequence.positions(), numbers)?;
         say(&format!(
-            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces inside out",
+            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces newly inside out",
             self.outputs.out.display(),
             numbers["n"],
             numbers["V"],
@@ -173,13 +176,10 @@ impl TransferVerb {
     /// The examples of one side, the reference pose first.
     fn examples(&self, side: usize) -> Result<Sequence, Failure> {
         let name = &self.examples[side];
-        let choice = FrameChoice {
-            frames: self.example_frames.clone(),
-            every: 1,
-        };
-        let poses = choice
-            .open(name)
-            .map_err(|e| format!("--examples {name}: {e}"))?;
+        let poses = open(name)?;
+        let indices = chosen(&self.example_frames, poses.frame_count());
+        let indices = indices.map_err(|e| format!("--examples {name}: --example-{e}"))?;
+        let poses = poses.select(&indices)?;
         let Some(rest) = self.rest.as_ref().map(|rest| &rest[side]) else {
             return Ok(poses);
         };
@@ -221,8 +221,9 @@ impl TransferVerb {
             return Err(self.other_mesh());
         }
         let n = sequence.frame_count();
-        let z = encode_all(&*a.space, sequence.positions())?;
         let basis = ExampleBasis::new(a.z.as_ref())?;
+        let rest = a.sequence.frame(0);
+        let z = encode_motion(&*a.space, rest, &basis, sequence.positions())?;
         let (k, l) = (self.k.unwrap_or(n + 2), self.l.unwrap_or(n));
         let fit = basis.fit(z.as_ref(), k, l, knots, &[])?;
         Ok(Motion {
@@ -266,8 +267,18 @@ fn encoded(
     })
 }
 
+/// The 0-based frames of ranges `A..B` with commas between them.
+fn chosen(ranges: &str, count: usize) -> Result<Vec<usize>, Failure> {
+    let mut indices = Vec::new();
+    for range in ranges.split(',') {
+        let frames: Frames = range.parse()?;
+        indices.extend(frames.indices(count)?);
+    }
+    Ok(indices)
+}
+
 /// Whether a file holds a representation, and not a sequence or nothing that can be read.
 fn is_representation(path: &Path) -> bool {
     let npz = path.extension().is_some_and(|e| e == "npz") && path.is_file();
-    npz && npz::read_arrays(path).is_ok_and(|arrays| arrays.iter().any(|(name, _)| name == "h0"))
+    npz && npz::Archive::open(path).is_ok_and(|archive| archive.names().any(|name| name == "h0"))
 }
