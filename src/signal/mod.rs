@@ -12,6 +12,7 @@
 //! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//! | (6, beyond the paper) (2) minimised itself | [`refine`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
@@ -31,6 +32,7 @@ pub mod parameters;
 pub mod pins;
 pub mod poses;
 pub mod psi;
+pub mod refine;
 pub mod rho;
 pub mod sites;
 pub mod thin_plate;
