@@ -178,6 +178,16 @@ faults! {
             let m = row_length(inputs, "g");
             numbers(inputs, "g", |g| { let at = g.len() - 2 * m; g[at..].fill(0.0) });
         });
+    "refine-unfinished" in "signal.refine": "the best g and h for the start's curve and sites, which stay",
+        Inputs(|inputs| integers(inputs, "iterations", |steps| steps[0] = 0));
+    "refine-staged" in "signal.refine": "a site a thousandth off, g and h as they were",
+        Outputs(|_, out| numbers(out, "sites", |s| s[0] *= 1.001));
+    "refine-weights" in "signal.refine": "frames between frames weighted as frames",
+        Inputs(|inputs| numbers(inputs, "w", |w| w.fill(1.0)));
+    "refine-claim" in "signal.refine": "the error claimed a millionth too small",
+        Outputs(|_, out| numbers(out, "error", |e| e[0] *= 1.0 - SLIGHT));
+    "refine-dimension-dropped" in "signal.refine": "the last shape coordinate of g at 0",
+        Outputs(|_, out| zero_last_column(out, "g"));
     "signal-other-knots" in "signal": "the other averaging rule",
         Inputs(other_rule);
     "signal-site-dropped" in "signal": "one site fewer",

@@ -8,6 +8,7 @@ mod encoding;
 mod forms;
 mod pipeline;
 mod pose;
+mod refinement;
 mod scaling;
 mod shape;
 mod time;
@@ -47,6 +48,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.spline" => (time::spline_own, time::spline_against),
         "signal.rho" => (time::rho_own, time::rho_against),
         "signal.psi" => (chain::psi_own, chain::psi_against),
+        "signal.refine" => (refinement::own, refinement::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };

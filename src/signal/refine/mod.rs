@@ -14,6 +14,7 @@ mod projection;
 pub mod rows;
 #[cfg(test)]
 mod tests;
+pub mod tolerance;
 
 use std::time::{Duration, Instant};
 
@@ -71,6 +72,20 @@ pub struct Refinement {
     /// The weight that the frames between frames had.
     pub between: f64,
     pub elapsed: Duration,
+}
+
+impl Refinement {
+    /// Of a fit that stays as it is.
+    pub fn none(fit: &Fit, options: &RefineOptions) -> Self {
+        Self {
+            before: fit.errors.psi,
+            after: fit.errors.psi,
+            iterations: 0,
+            gradient: f64::NAN,
+            between: options.between,
+            elapsed: Duration::ZERO,
+        }
+    }
 }
 
 /// f, g and h in r dimensions.
@@ -134,7 +149,8 @@ pub fn minimise(
     minimise_until(rows, spline, sites, m, options, 0.0)
 }
 
-fn minimise_until(
+/// The same, done once the error is at most `enough`.
+pub(super) fn minimise_until(
     rows: &Rows,
     spline: &Spline,
     sites: &[Point],
@@ -211,14 +227,7 @@ pub(super) fn refine_within(
     enough: f64,
 ) -> (Fit, Refinement) {
     let start = Instant::now();
-    let mut refinement = Refinement {
-        before: fit.errors.psi,
-        after: fit.errors.psi,
-        iterations: 0,
-        gradient: f64::NAN,
-        between: options.between,
-        elapsed: Duration::ZERO,
-    };
+    let mut refinement = Refinement::none(&fit, options);
     let psi = &fit.representation;
     let (parameters, m) = (&psi.time.parameters, psi.basis.ncols());
     let frames = Rows::of_frames(whole.coordinates.as_ref(), parameters, 0.0);

@@ -17,9 +17,9 @@ const LEAST_DIAGONAL: f64 = 1e-12;
 /// make up for. All of it lies in the m dimensions of H. A site's functions keep the side conditions because its move is made up for by the least
 /// change of all coefficients that does so.
 pub(super) struct Normal {
-    matrix: Mat<f64>,
+    pub matrix: Mat<f64>,
     /// J^T E: minus half of the gradient of the error.
-    descent: Mat<f64>,
+    pub descent: Mat<f64>,
 }
 
 impl Normal {
