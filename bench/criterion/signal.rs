@@ -14,6 +14,7 @@ use meshseq::signal::knots::{KnotRule, knots};
 use meshseq::signal::mds::{Dissimilarities, scale};
 use meshseq::signal::parameters::centripetal;
 use meshseq::signal::pins::{Pin, principal_start};
+use meshseq::signal::refine::{RefineOptions, refine};
 use meshseq::signal::repin::Scaling;
 use meshseq::signal::sites::site_order;
 use rayon::prelude::*;
@@ -197,6 +198,31 @@ fn whole(c: &mut Criterion) {
     }
 }
 
+/// Steps of a refinement: in n with V fixed, and in V with n fixed, which must not matter beyond the shape signal.
+fn refinement(c: &mut Criterion) {
+    let mut group = c.benchmark_group("refine");
+    let five = RefineOptions {
+        iterations: 5,
+        tolerance: 0.0,
+        ..RefineOptions::default()
+    };
+    for (n, vertices) in [(24, 1000), (100, 1000), (204, 1000), (204, 10_000)] {
+        let z = frames(3 * vertices, n);
+        let options = FitOptions {
+            k: n * 3 / 4,
+            l: n * 7 / 10,
+            m: 40.min(n / 3),
+            knots: KnotRule::Symmetric,
+            pins: Vec::new(),
+        };
+        let staged = fit(z.as_ref(), &options).unwrap();
+        let name = format!("five steps, V = {vertices}, frames");
+        group.bench_function(BenchmarkId::new(name, n), |b| {
+            b.iter(|| refine(z.as_ref(), staged.clone(), &five).unwrap());
+        });
+    }
+}
+
 fn quick() -> Criterion {
     Criterion::default()
         .sample_size(10)
@@ -207,6 +233,6 @@ fn quick() -> Criterion {
 criterion_group! {
     name = benches;
     config = quick();
-    targets = h, mds, repin, sites_and_rbf, f, psi, whole
+    targets = h, mds, repin, sites_and_rbf, f, psi, whole, refinement
 }
 criterion_main!(benches);

@@ -22,9 +22,13 @@ use crate::shape::{SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
-use crate::signal::in_space::{SpaceFit, fit_in_space, fit_in_space_to_rms};
+use crate::signal::in_space::{
+    SpaceFit, fit_in_space, fit_in_space_to_rms, fit_in_space_to_rms_refined, refine_in_space,
+};
 use crate::signal::knots::KnotRule;
 use crate::signal::pins::{Pin, validate_pins};
+use crate::signal::refine::tolerance::fit_to_error_refined;
+use crate::signal::refine::{self, RefineOptions, Refinement};
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -89,6 +93,12 @@ pub struct FitVerb {
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]
     pins: Option<PathBuf>,
+    /// Lower the error of the whole chain jointly, from where its stages end
+    #[arg(long)]
+    refine: bool,
+    /// With --refine: weight of the frames half-way between frames, beside 1 for a frame
+    #[arg(long, value_name = "W", default_value_t = RefineOptions::default().between, requires = "refine", allow_negative_numbers = true)]
+    between: f64,
     /// Write the representation to this .npz
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -111,6 +121,11 @@ impl FitVerb {
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
+        if !(self.between >= 0.0 && self.between.is_finite()) {
+            return Err(
+                format!("--between {}: expected a weight of 0 or more", self.between).into(),
+            );
+        }
         let sequence = self.frames.open(&self.sequence)?;
         let pins = match &self.pins {
             Some(path) => read_pins(path, sequence.frame_count())?,
@@ -119,8 +134,11 @@ impl FitVerb {
         let reference = self.reference(&sequence, space)?;
         let (mesh, frames) = (sequence.connectivity(), sequence.positions());
         let patches = patches_for(space, mesh, &reference, frames)?;
-        let fitted = self.fit(&sequence, space, &reference, &patches, knots, pins)?;
-        let numbers = numbers(&sequence, &fitted, space, knots);
+        let (fitted, refinement) = self.fit(&sequence, space, &reference, &patches, knots, pins)?;
+        let mut numbers = numbers(&sequence, &fitted, space, knots);
+        if let Some(told) = &refinement {
+            numbers["refine"] = refine_numbers(told);
+        }
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -175,7 +193,11 @@ impl FitVerb {
         patches: &[i64],
         knots: KnotRule,
         pins: Vec<Pin>,
-    ) -> Result<SpaceFit, Failure> {
+    ) -> Result<(SpaceFit, Option<Refinement>), Failure> {
+        let refine = self.refine.then(|| RefineOptions {
+            between: self.between,
+            ..RefineOptions::default()
+        });
         let constants = match (self.k, self.l, self.m) {
             (Some(k), Some(l), Some(m)) => Some(FitOptions {
                 k,
@@ -190,25 +212,46 @@ impl FitVerb {
         if space == SpaceKind::Vertex {
             let (d, n) = (sequence.dimension(), sequence.frame_count());
             let frames = MatRef::from_column_major_slice(sequence.positions(), d, n);
-            let fit = match &constants {
-                Some(options) => fit(frames, options)?,
-                None => fit_to_error(frames, allowed_error(sequence, tolerance), knots, &pins)?,
+            let most = allowed_error(sequence, tolerance);
+            let (fit, told) = match (&constants, &refine) {
+                (Some(options), None) => (fit(frames, options)?, None),
+                (Some(options), Some(how)) => {
+                    some(refine::refine(frames, fit(frames, options)?, how)?)
+                }
+                (None, None) => (fit_to_error(frames, most, knots, &pins)?, None),
+                (None, Some(how)) => some(fit_to_error_refined(frames, most, knots, &pins, how)?),
             };
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
-            return Ok(SpaceFit { fit, rms });
+            return Ok((SpaceFit { fit, rms }, told));
         }
         let connectivity = sequence.connectivity().clone();
-        let prepared = prepare(space, connectivity, reference, patches)?;
+        let space = &*prepare(space, connectivity, reference, patches)?;
         let frames = sequence.positions();
-        Ok(match &constants {
-            Some(options) => fit_in_space(&*prepared, frames, options)?,
-            None => {
-                let size = bounds(sequence.frame(0)).diagonal();
-                let rms = (tolerance * size).max(f64::MIN_POSITIVE);
-                fit_in_space_to_rms(&*prepared, frames, rms, knots, &pins)?
+        let size = bounds(sequence.frame(0)).diagonal();
+        let rms = (tolerance * size).max(f64::MIN_POSITIVE);
+        Ok(match (&constants, &refine) {
+            (Some(options), None) => (fit_in_space(space, frames, options)?, None),
+            (Some(options), Some(how)) => {
+                let staged = fit_in_space(space, frames, options)?;
+                some(refine_in_space(space, frames, staged, how)?)
             }
+            (None, None) => (fit_in_space_to_rms(space, frames, rms, knots, &pins)?, None),
+            (None, Some(how)) => some(fit_in_space_to_rms_refined(
+                space, frames, rms, knots, &pins, how,
+            )?),
         })
     }
+}
+
+fn some<T, U>((fit, told): (T, U)) -> (T, Option<U>) {
+    (fit, Some(told))
+}
+
+fn refine_numbers(told: &Refinement) -> serde_json::Value {
+    json!({
+        "error_psi_before": told.before, "error_psi": told.after, "iterations": told.iterations,
+        "gradient": told.gradient, "between": told.between, "time_ms": told.elapsed.as_secs_f64() * 1e3,
+    })
 }
 
 /// The error (2) at which the relative RMS is `relative`.
@@ -273,11 +316,20 @@ fn spread(sequence: &Sequence) -> f64 {
 fn describe(name: &str, v: &serde_json::Value) -> String {
     let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
+    let refined = v.get("refine").map_or(String::new(), |r| {
+        let number = |key: &str| r[key].as_f64().unwrap_or(f64::NAN);
+        format!(
+            "\nrefined: (2) from {:.5} in {} steps and {:.0} ms",
+            number("error_psi_before"),
+            r["iterations"],
+            number("time_ms")
+        )
+    });
     format!(
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
-         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],

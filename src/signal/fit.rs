@@ -243,6 +243,11 @@ impl Base {
         }
     }
 
+    /// t_1 .. t_n.
+    pub(super) fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
     /// m.
     pub(super) fn dimension(&self) -> usize {
         self.shape.basis.ncols()
@@ -375,8 +380,8 @@ impl Base {
 
 /// Signals for one choice of k and sites.
 pub(super) struct Attempt {
-    pose: PoseSignal,
-    spline: Spline,
+    pub(super) pose: PoseSignal,
+    pub(super) spline: Spline,
     pub(super) errors: Errors,
     pub(super) sites: SiteOrder,
     same_pose: f64,

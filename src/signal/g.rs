@@ -61,30 +61,14 @@ impl PoseSignal {
         let frame = Frame::new(&chosen);
         let normalised: Vec<Point> = chosen.iter().map(|&p| frame.normalise(p)).collect();
         check_apart(&normalised)?;
-        let (l, affine) = (chosen.len(), frame.affine);
-        let columns = |q: Point| [1.0, q[0], q[1]];
-        let side = Qr::new(Mat::from_fn(l, affine, |j, a| columns(normalised[j])[a]));
         let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
-        let mut bends = Mat::zeros(l, points.len());
-        for (i, &q) in queries.iter().enumerate() {
-            kernels(q, &normalised, bends.col_as_slice_mut(i));
-        }
-        side.apply_transpose(&mut bends);
-        let system = Mat::from_fn(points.len(), l, |i, j| {
-            if j < affine {
-                columns(queries[i])[j]
-            } else {
-                bends[(j, i)]
-            }
-        });
+        let design = Design::new(&normalised, frame.affine, &queries);
         let mut right = coordinates.transpose().to_owned();
-        let qr = Qr::new(system);
+        let qr = Qr::new(design.matrix(&queries));
         qr.apply_transpose(&mut right);
         let solution = qr.solve_upper(&right);
-        let mut weights = Mat::from_fn(l, coordinates.nrows(), |j, a| {
-            if j < affine { 0.0 } else { solution[(j, a)] }
-        });
-        side.apply(&mut weights);
+        let weights = design.kernel_weights(&solution);
+        let affine = frame.affine;
         let affine_part = solution.get(..affine, ..);
         Ok(Self {
             coefficients: in_given_units(&frame, &normalised, &weights, affine_part),
@@ -143,6 +127,59 @@ impl PoseSignal {
     }
 }
 
+/// The functions of the pose plane that meet the side conditions, for l sites that span an affine space of functions of dimension `affine`: 1, x
+/// and y of it, and l - affine sums of kernels. Sites and points are in the coordinates of a [`Frame`].
+pub(super) struct Design {
+    /// Of the l x affine matrix [1 s].
+    pub side: Qr,
+    /// The kernels (a site a row, a point a column) after Q^T of `side`: below the first `affine` rows are the sums that meet the conditions.
+    pub bends: Mat<f64>,
+    pub affine: usize,
+}
+
+impl Design {
+    /// O(l points) kernels.
+    pub fn new(sites: &[Point], affine: usize, points: &[Point]) -> Self {
+        let side = Qr::new(Mat::from_fn(sites.len(), affine, |j, a| {
+            [1.0, sites[j][0], sites[j][1]][a]
+        }));
+        let mut bends = Mat::zeros(sites.len(), points.len());
+        for (i, &q) in points.iter().enumerate() {
+            kernels(q, sites, bends.col_as_slice_mut(i));
+        }
+        side.apply_transpose(&mut bends);
+        Self {
+            side,
+            bends,
+            affine,
+        }
+    }
+
+    /// The functions at the points, one a column.
+    pub fn matrix(&self, points: &[Point]) -> Mat<f64> {
+        Mat::from_fn(points.len(), self.bends.nrows(), |i, j| {
+            if j < self.affine {
+                [1.0, points[i][0], points[i][1]][j]
+            } else {
+                self.bends[(j, i)]
+            }
+        })
+    }
+
+    /// The weights of the l kernels, one a row, from the coefficients of the functions.
+    pub fn kernel_weights(&self, solution: &Mat<f64>) -> Mat<f64> {
+        let mut weights = Mat::from_fn(solution.nrows(), solution.ncols(), |j, a| {
+            if j < self.affine {
+                0.0
+            } else {
+                solution[(j, a)]
+            }
+        });
+        self.side.apply(&mut weights);
+        weights
+    }
+}
+
 fn choose(points: &[Point], sites: &[usize]) -> Result<Vec<Point>, PoseError> {
     if sites.is_empty() {
         return Err(PoseError::NoSites);
@@ -179,7 +216,7 @@ fn check_apart(normalised: &[Point]) -> Result<(), PoseError> {
 
 /// Coefficients in the units of the points: with q = (p - c) / s, phi(r / s) = (phi(r) - r^2 ln s) / s^2, and the side conditions turn
 /// sum_j c_j ||p - s_j||^2 into the constant sum_j c_j ||s_j - c||^2.
-fn in_given_units(
+pub(super) fn in_given_units(
     frame: &Frame,
     normalised: &[Point],
     weights: &Mat<f64>,

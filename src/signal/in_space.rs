@@ -9,6 +9,8 @@ use super::fit::{Fit, FitError, FitOptions, fit};
 use super::knots::KnotRule;
 use super::pins::Pin;
 use super::psi::Representation;
+use super::refine::tolerance::fit_to_error_refined;
+use super::refine::{RefineOptions, Refinement, refine};
 use crate::shape::{ShapeError, Space, decode_all, encode_all};
 
 /// Fits tried until the vertices are near enough.
@@ -47,6 +49,19 @@ pub fn fit_in_space(
     Ok(SpaceFit { fit, rms })
 }
 
+/// Refines a fit to these frames. (2) in S does not rise; what that makes of the vertices is measured.
+pub fn refine_in_space(
+    space: &dyn Space,
+    frames: &[f64],
+    found: SpaceFit,
+    options: &RefineOptions,
+) -> Result<(SpaceFit, Refinement), SpaceFitError> {
+    let z = encode_all(space, frames)?;
+    let (fit, refinement) = refine(z.as_ref(), found.fit, options)?;
+    let rms = rms_after_decoding(space, frames, &fit.representation)?;
+    Ok((SpaceFit { fit, rms }, refinement))
+}
+
 /// Chooses k, l and m (section 3.4) so that the vertices are off by at most `rms` after decoding.
 ///
 /// The allowed error (2) in S starts at the share of the frames' spread in S that `rms` is of their spread in space, and is then moved by what the
@@ -58,22 +73,31 @@ pub fn fit_in_space_to_rms(
     knots: KnotRule,
     pins: &[Pin],
 ) -> Result<SpaceFit, SpaceFitError> {
-    if !(rms > 0.0 && rms.is_finite()) {
-        return Err(FitError::BadTolerance { value: rms }.into());
-    }
-    let z = encode_all(space, frames)?;
+    let staged = |z: MatRef<'_, f64>, most| Ok((fit_to_error(z, most, knots, pins)?, ()));
+    let interpolating = |z: MatRef<'_, f64>| Ok((interpolate(z, knots, pins)?, ()));
+    Ok(to_rms(space, frames, rms, staged, interpolating)?.0)
+}
+
+/// The same with what [`fit_to_error_refined`] chooses.
+pub fn fit_in_space_to_rms_refined(
+    space: &dyn Space,
+    frames: &[f64],
+    rms: f64,
+    knots: KnotRule,
+    pins: &[Pin],
+    options: &RefineOptions,
+) -> Result<(SpaceFit, Refinement), SpaceFitError> {
+    let refined = |z: MatRef<'_, f64>, most| fit_to_error_refined(z, most, knots, pins, options);
+    let interpolating = |z: MatRef<'_, f64>| {
+        let fit = interpolate(z, knots, pins)?;
+        let untouched = Refinement::none(&fit, options);
+        Ok((fit, untouched))
+    };
+    to_rms(space, frames, rms, refined, interpolating)
+}
+
+fn interpolate(z: MatRef<'_, f64>, knots: KnotRule, pins: &[Pin]) -> Result<Fit, FitError> {
     let n = z.ncols();
-    let given = MatRef::from_column_major_slice(frames, space.frame_len(), n);
-    let allowed = rms * rms * frames.len() as f64 / 3.0;
-    let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
-    for _ in 0..ATTEMPTS {
-        let fit = fit_to_error(z.as_ref(), most.max(f64::MIN_POSITIVE), knots, pins)?;
-        let found = rms_after_decoding(space, frames, &fit.representation)?;
-        if found <= rms {
-            return Ok(SpaceFit { fit, rms: found });
-        }
-        most *= AIM * (rms / found).powi(2);
-    }
     let options = FitOptions {
         k: n + 2,
         l: n,
@@ -81,9 +105,35 @@ pub fn fit_in_space_to_rms(
         knots,
         pins: pins.to_vec(),
     };
-    let fit = fit(z.as_ref(), &options)?;
+    fit(z, &options)
+}
+
+/// A fit by `to_error`, with the error (2) that the vertices ask for, or the last resort.
+fn to_rms<T>(
+    space: &dyn Space,
+    frames: &[f64],
+    rms: f64,
+    to_error: impl Fn(MatRef<'_, f64>, f64) -> Result<(Fit, T), FitError>,
+    last_resort: impl Fn(MatRef<'_, f64>) -> Result<(Fit, T), FitError>,
+) -> Result<(SpaceFit, T), SpaceFitError> {
+    if !(rms > 0.0 && rms.is_finite()) {
+        return Err(FitError::BadTolerance { value: rms }.into());
+    }
+    let z = encode_all(space, frames)?;
+    let given = MatRef::from_column_major_slice(frames, space.frame_len(), z.ncols());
+    let allowed = rms * rms * frames.len() as f64 / 3.0;
+    let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
+    for _ in 0..ATTEMPTS {
+        let (fit, told) = to_error(z.as_ref(), most.max(f64::MIN_POSITIVE))?;
+        let found = rms_after_decoding(space, frames, &fit.representation)?;
+        if found <= rms {
+            return Ok((SpaceFit { fit, rms: found }, told));
+        }
+        most *= AIM * (rms / found).powi(2);
+    }
+    let (fit, told) = last_resort(z.as_ref())?;
     let rms = rms_after_decoding(space, frames, &fit.representation)?;
-    Ok(SpaceFit { fit, rms })
+    Ok((SpaceFit { fit, rms }, told))
 }
 
 /// psi at many times as frames of 3V positions, decoded.

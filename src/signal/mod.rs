@@ -12,6 +12,7 @@
 //! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//! | (6, beyond the paper) (2) minimised itself | [`refine`] |
 //! | 4.1 edits of the time signal, knots that leave it as it is | [`edit`], [`insert`]; in files [`edits_toml`] |
 //! | 4.2 times for other rates, slow and fast motion | [`resample`] |
 //! | 4.3 transfer by examples | [`transfer`] |
@@ -40,6 +41,7 @@ pub mod parameters;
 pub mod pins;
 pub mod poses;
 pub mod psi;
+pub mod refine;
 pub mod repin;
 pub mod resample;
 pub mod rho;

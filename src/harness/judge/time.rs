@@ -138,7 +138,7 @@ pub fn knots_against(
 }
 
 /// B_j(u) for j = 0..k by the recursion of Cox & de Boor, in its definition's form: slow and plain. `full` are the k + 4 knots.
-fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
+pub fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
     if degree == 0 {
         let last = full[full.len() - 1];
         let closes = u == last && full[j] < last && full[j + 1] == last;
@@ -164,7 +164,7 @@ fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
 }
 
 /// One more copy of each end knot.
-fn full(u: &[f64]) -> Vec<f64> {
+pub fn full(u: &[f64]) -> Vec<f64> {
     let ends = (u.first().copied(), u.last().copied());
     ends.0
         .into_iter()
