@@ -170,15 +170,6 @@ tolerances! {
         "coordinate_difference" <= 1e-9, "least squares by another factorisation: eps times the condition of the examples, squared by the normal equations";
         "frame_difference" <= 1e-9, "as coordinates";
     }
-    "signal.refine" {
-        "claimed_error" <= 1e-7, "the error again by three formulas in a row; kernels and coefficients cancel";
-        "above_start" <= 0.0, "every step goes down";
-        "above_least" <= 1e-7, "g and h are the best there are for their curve and sites, up to what the formulas cancel";
-        "slope" <= 1e-3, "a descent with g and h projected out nears a vanishing gradient linearly, in valleys slowly; it starts at 1 or more";
-        "side_conditions" <= 1e-10, "coefficients come from a null space";
-        "orthonormality" <= 1e-12, "H comes of a singular value decomposition";
-        "above_theirs" <= 1e-3, "the same minimum, reached by another descent; an engine may find a lower one";
-    }
     "signal" {
         "claimed_error_psi" <= 1e-9, "error (2) again from the frames";
         "claimed_error_h" <= 1e-10, "error (3) again from singular values";

@@ -70,16 +70,21 @@ fn draw(chart: &Chart) -> Result<String, PlotError> {
         .iter()
         .enumerate()
         .filter(|(_, l)| !l.name.is_empty());
-    let legend: Vec<_> = named
-        .map(|(i, line)| (mark(line.style), colour(i), line.name.as_str()))
+    let named: Vec<_> = named
+        .map(|(i, line)| (i, line.style, printable(&line.name)))
         .collect();
+    let legend: Vec<_> = named
+        .iter()
+        .map(|(i, style, name)| (mark(*style), colour(*i), name.as_str()))
+        .collect();
+    let [x_title, y_title] = [&chart.x_title, &chart.y_title].map(|t| printable(t));
     let frame = Frame {
         size: (SIZE.0, height),
         label: &chart.title,
         x,
         y,
-        x_title: &chart.x_title,
-        y_title: &chart.y_title,
+        x_title: &x_title,
+        y_title: &y_title,
         sides: (80, 0),
         legend: &legend,
     };
@@ -90,6 +95,13 @@ fn draw(chart: &Chart) -> Result<String, PlotError> {
             draw_line(canvas, line.style, places, colour(i))
         })
     })
+}
+
+/// Text without what an SVG may not hold; plotters escapes the rest.
+fn printable(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .collect()
 }
 
 fn colour(i: usize) -> RGBColor {
