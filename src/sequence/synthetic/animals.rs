@@ -2,7 +2,7 @@
 //!
 //! Two animals of different proportions and connectivity with the same bones and markers: a pose of one is a pose of the other, which makes the
 //! example pairs of deformation transfer (Cashman & Hormann 2012, section 4.3), and the answer to compare a transfer with: the gallop given to
-//! the hound is [`posed`]`(Animal::Hound, ..)` in the poses of [`gallop::pose`](super::gallop::pose).
+//! the hound is [`posed`]`(Animal::Hound, ..)` in the poses of [`gallop::pose`].
 
 use super::horse::HORSE;
 use super::hound::HOUND;
