@@ -30,6 +30,9 @@ struct Time<'a> {
     peer: Option<&'a TimingRow>,
 }
 
+/// A row of Table 1 and its times in this run.
+type Row<'a, 'p> = (&'p PublishedRow, [Time<'a>; 4]);
+
 /// What a case of this row of Table 1 gives as the source of its published time.
 pub fn source(row: &PublishedRow) -> String {
     format!("Table 1, Figure {}", row.figure)
@@ -79,10 +82,7 @@ impl Time<'_> {
 fn rows<'a, 'p>(
     record: &'a Record,
     published: &'p [PublishedRow],
-) -> (
-    Vec<(&'p PublishedRow, [Time<'a>; 4])>,
-    Vec<&'p PublishedRow>,
-) {
+) -> (Vec<Row<'a, 'p>>, Vec<&'p PublishedRow>) {
     let (mut with, mut without) = (Vec::new(), Vec::new());
     for row in published {
         let times = COLUMNS.map(|column| time(record, row, &column));
@@ -125,7 +125,7 @@ pub(super) fn table(record: &Record, published: &[PublishedRow]) -> String {
     beside + &unmatched(&without)
 }
 
-fn compared(rows: &[(&PublishedRow, [Time; 4])]) -> String {
+fn compared(rows: &[Row]) -> String {
     let cells = |time: &Time| {
         let [signal, rest @ ..] = time.words().map(|word| escape(&word));
         let mut cells = vec![Cell::text(signal)];

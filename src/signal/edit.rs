@@ -96,7 +96,7 @@ pub enum EditProblem {
         last: usize,
         count: usize,
     },
-    /// More frames or control points than [`MOST`].
+    /// More frames or control points than `MOST`.
     #[error("the sequence would have more than {MOST} frames or control points")]
     TooLong,
     /// See [`SketchError`].
@@ -725,7 +725,7 @@ mod tests {
             ),
             (
                 Edit::Reverse {
-                    frames: 5..=4,
+                    frames: std::ops::RangeInclusive::new(5, 4),
                     join: 0,
                 },
                 "frames 6..5",

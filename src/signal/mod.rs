@@ -17,7 +17,6 @@
 //! | 4.2 times for other rates, slow and fast motion | [`resample`] |
 //! | 4.3 transfer by examples | [`transfer`] |
 //! | 4.4 poses placed by hand, a sketched curve | [`design`], [`sketch`] |
-//! | 6 long sequences | [`windows`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
@@ -50,7 +49,6 @@ pub mod sketch;
 mod strand;
 pub mod thin_plate;
 pub mod transfer;
-pub mod windows;
 
 /// A point of the pose plane.
 pub type Point = [f64; 2];

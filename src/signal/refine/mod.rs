@@ -2,8 +2,8 @@
 //!
 //! The paper minimises (3), (6), (4) and (7) one after the other because (2) is "very expensive" to minimise directly. It is not, for three reasons.
 //! All frames lie in the span of themselves, at most n - 1 dimensions, so the number of vertices does not matter. For given f and sites the best g
-//! and h are a reduced-rank regression, in closed form ([`projection`]). And what is left, 2k + 2l numbers, is a small nonlinear least squares
-//! ([`normal`], [`descent`]).
+//! and h are a reduced-rank regression, in closed form (`projection`). And what is left, 2k + 2l numbers, is a small nonlinear least squares
+//! (`normal`, `descent`).
 //!
 //! (2) alone says nothing of psi between the frames, and the more of it goes, the wilder psi swings there. So frames half-way between neighbours
 //! count too, with a small weight ([`rows`]); the weight 0 is the paper's (2).

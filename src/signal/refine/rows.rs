@@ -15,6 +15,9 @@ pub struct Rows {
     pub weights: Vec<f64>,
 }
 
+/// A parameter, a weight, and the frames that make the target with their shares.
+type Row = (f64, f64, Vec<(usize, f64)>);
+
 impl Rows {
     /// The n frames (`frames` is r x n) at their non-decreasing parameters, with weight 1. Where `between` is positive, so are the frames half-way
     /// between neighbours, with that weight, at the parameter rho(i + 1/2): cubic interpolation of the four frames around, (-1, 9, 9, -1) / 16, and
@@ -23,7 +26,7 @@ impl Rows {
         let n = parameters.len();
         let rho = Rho::new(parameters);
         let moves = |i: usize| i + 1 < n && between > 0.0 && parameters[i] < parameters[i + 1];
-        let mut rows: Vec<(f64, f64, Vec<(usize, f64)>)> = Vec::with_capacity(2 * n);
+        let mut rows: Vec<Row> = Vec::with_capacity(2 * n);
         for i in 0..n {
             rows.push((parameters[i], 1.0, vec![(i, 1.0)]));
             if moves(i) {
