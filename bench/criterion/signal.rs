@@ -144,13 +144,7 @@ fn psi(c: &mut Criterion) {
     let mut group = c.benchmark_group("psi");
     for vertices in [2_904, 10_000, 50_000, 200_000] {
         let z = frames(3 * vertices, 48);
-        let options = FitOptions {
-            k: 40,
-            l: 30,
-            m: 42,
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(40, 30, 42);
         let r = fit(z.as_ref(), &options).unwrap().representation;
         let mut frame = vec![0.0; r.dimension()];
         group.bench_function(BenchmarkId::new("psi(t), vertices", vertices), |b| {
@@ -185,13 +179,7 @@ fn whole(c: &mut Criterion) {
     for n in [24, 204, 1000] {
         let z = frames(3000, n);
         let z: MatRef<'_, f64> = z.as_ref();
-        let options = FitOptions {
-            k: n * 3 / 4,
-            l: n * 7 / 10,
-            m: 40.min(n / 3),
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3));
         group.bench_function(BenchmarkId::new("frames, V = 1000", n), |b| {
             b.iter(|| fit(z, &options).unwrap());
         });
@@ -208,13 +196,7 @@ fn refinement(c: &mut Criterion) {
     };
     for (n, vertices) in [(24, 1000), (100, 1000), (204, 1000), (204, 10_000)] {
         let z = frames(3 * vertices, n);
-        let options = FitOptions {
-            k: n * 3 / 4,
-            l: n * 7 / 10,
-            m: 40.min(n / 3),
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3));
         let staged = fit(z.as_ref(), &options).unwrap();
         let name = format!("five steps, V = {vertices}, frames");
         group.bench_function(BenchmarkId::new(name, n), |b| {

@@ -48,17 +48,15 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let (k_now, n_now) = (after.time.spline.control.len(), after.time.frame_count());
     let shown: Vec<f64> = new.iter().copied().step_by(3).collect();
     let made = after.evaluate(&shown);
-    let faces = sequence.connectivity().faces();
     let at = |t: &f64| after.time.evaluate(*t);
     let before = (1..=n).map(|i| time.evaluate(i as f64)).collect();
     let strip = poses(
         "Every third of the new frames",
         &made,
-        faces,
+        &sequence,
         MARKED,
         View::around_y(35.0, 10.0),
         [110, 160],
-        shown.len(),
     );
     Ok(Exhibit {
         name: NAME.into(),

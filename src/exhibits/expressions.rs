@@ -56,9 +56,8 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
         .map(|i| 1.0 + (i * (FRAMES - 1)) as f64 / (SHOWN - 1) as f64)
         .collect();
     let frames = made.evaluate(&shown);
-    let faces = sequence.connectivity().faces();
-    let strip = |title: &str, frames: &[f64], colour, count| {
-        poses(title, frames, faces, colour, View::FRONT, [100, 130], count)
+    let strip = |title: &str, frames: &[f64], colour| {
+        poses(title, frames, &sequence, colour, View::FRONT, [100, 130])
     };
     let at = |t: &f64| made.time.evaluate(*t);
     Ok(Exhibit {
@@ -77,8 +76,8 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
                     line("expressions", Style::Squares, PLACES[..count].to_vec()),
                 ],
             ),
-            strip("The expressions, 1 to 9", &sequence.positions()[..count * d], PLAIN, count),
-            strip("The new sequence", &frames, MARKED, SHOWN),
+            strip("The expressions, 1 to 9", &sequence.positions()[..count * d], PLAIN),
+            strip("The new sequence", &frames, MARKED),
         ],
     })
 }

@@ -22,7 +22,6 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let fit = found.map_err(ExhibitError::of(NAME))?.fit;
     let made = sample_in_space(&*space, &fit.representation, &SHOWN);
     let made = made.map_err(ExhibitError::of(NAME))?;
-    let faces = sequence.connectivity().faces();
     let view = View::around_y(30.0, 15.0);
     let title = "psi(i), decoded, i = 1, 20, 40, ..., 100";
     Ok(Exhibit {
@@ -34,7 +33,7 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
         datasets: vec![DATASET.into()],
         panels: vec![
             time_signal("The time signal over the pose plane", &fit, &SHOWN),
-            poses(title, &made, faces, PLAIN, view, [150, 130], SHOWN.len()),
+            poses(title, &made, &sequence, PLAIN, view, [150, 130]),
         ],
     })
 }

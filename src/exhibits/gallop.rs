@@ -23,12 +23,11 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
     };
     let z = MatRef::from_column_major_slice(frames, sequence.dimension(), n);
     let fit = fit(z, &options).map_err(ExhibitError::of(NAME))?;
-    let faces = sequence.connectivity().faces();
     let cycle = |first: usize| -> Vec<f64> { SHOWN.map(|i| (first + i) as f64).to_vec() };
     let strip = |title: &str, times: &[f64]| -> Panel {
         let made = fit.representation.evaluate(times);
         let view = View::around_y(68.0, 12.0);
-        poses(title, &made, faces, PLAIN, view, [150, 140], times.len())
+        poses(title, &made, &sequence, PLAIN, view, [150, 140])
     };
     let shown = [cycle(0), cycle(FRAMES / 2)].concat();
     Ok(Exhibit {

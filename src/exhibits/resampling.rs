@@ -36,24 +36,13 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
             vec![dots, line("time signal f", Style::Line, curve(time))],
         )
     };
+    let (first, step) = (n / 3, (n / 60).max(1));
     let strip = |what: &str, times: &[f64], colour| {
-        let chosen: Vec<f64> = (0..SHOWN).map(|i| times[n / 3 + i * n / 60]).collect();
+        let chosen: Vec<f64> = (0..SHOWN).map(|i| times[first + i * step]).collect();
         let made = fit.representation.evaluate(&chosen);
-        let title = format!(
-            "Every {}th frame from frame {} on, {what}",
-            (n / 60).max(1),
-            n / 3 + 1
-        );
-        let faces = sequence.connectivity().faces();
-        poses(
-            &title,
-            &made,
-            faces,
-            colour,
-            View::around_y(60.0, 15.0),
-            [120, 110],
-            SHOWN,
-        )
+        let title = format!("Frames {}, {}, ..., {what}", first + 1, first + 1 + step);
+        let view = View::around_y(60.0, 15.0);
+        poses(&title, &made, &sequence, colour, view, [120, 110])
     };
     let pairs = |times: &[f64]| uniform.iter().zip(times).map(|(&i, &t)| [i, t]).collect();
     Ok(Exhibit {

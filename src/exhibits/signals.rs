@@ -75,22 +75,20 @@ pub fn time_signal(title: &str, fit: &Fit, shown: &[f64]) -> Panel {
     )
 }
 
-/// Frames (n x 3V positions) side by side.
+/// Frames (n x 3V positions of this mesh) side by side.
 pub fn poses(
     title: &str,
     frames: &[f64],
-    faces: &[[u32; 3]],
+    mesh: &Sequence,
     colour: [f64; 3],
     view: View,
     cell: [usize; 2],
-    count: usize,
 ) -> Panel {
-    let len = (frames.len() / count.max(1)).max(1);
     let poses: Vec<Pose> = frames
-        .chunks(len)
+        .chunks_exact(mesh.dimension())
         .map(|positions| Pose {
             positions,
-            faces,
+            faces: mesh.connectivity().faces(),
             colour,
         })
         .collect();

@@ -5,13 +5,14 @@ use faer::MatRef;
 use super::render::{MARKED, PLAIN, View};
 use super::signals::poses;
 use super::{Exhibit, ExhibitError, Panel, Table};
+use crate::mesh::measure::bounds;
 use crate::mesh::orientation::Orientation;
 use crate::sequence::Sequence;
 use crate::sequence::dataset::{DataFolders, open};
-use crate::shape::{Space, SpaceKind, encode_examples, prepare_for};
+use crate::shape::{Space, SpaceKind, decode_all, encode_examples, prepare_for};
 use crate::signal::in_space::sample_in_space;
 use crate::signal::knots::KnotRule;
-use crate::signal::transfer::{ExampleBasis, encode_motion, replace_shape};
+use crate::signal::transfer::{ExampleBasis, encode_motion, frames_of_coordinates, replace_shape};
 
 const NAME: &str = "figure-7";
 /// Frames of the gallop, control points and sites, as in the paper.
@@ -39,8 +40,7 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
         .flat_map(|&i| given.motion.frame(i as usize - 1).to_vec())
         .collect();
     let strip = |title: String, frames: &[f64], mesh: &Sequence, colour| {
-        let faces = mesh.connectivity().faces();
-        poses(&title, frames, faces, colour, view, [150, 140], SHOWN.len())
+        poses(&title, frames, mesh, colour, view, [150, 140])
     };
     let mut panels = vec![strip("The motion".into(), &shown, &given.motion, PLAIN)];
     let mut rows = Vec::new();
@@ -159,23 +159,12 @@ fn moved(given: &Given, n: usize, kind: SpaceKind) -> Result<Moved, ExhibitError
     let every: Vec<f64> = (1..=n).map(|i| i as f64).collect();
     let faces = given.target.connectivity().faces();
     let orientation = Orientation::new(given.target.frame(0), faces);
-    let d = given.target.dimension();
-    let turned = |frames: &[f64]| -> Vec<Vec<u32>> {
-        frames
-            .chunks(d)
-            .map(|frame| orientation.turned(frame))
-            .collect()
-    };
-    let mut before = turned(given.target.positions()).concat();
-    before.sort_unstable();
-    let newly = turned(&sample(&every)?).concat();
-    let newly = newly
-        .iter()
-        .filter(|face| before.binary_search(face).is_err());
+    let before = orientation.turned_in_any(given.target.positions());
+    let newly = orientation.newly_turned(&sample(&every)?, &before);
     Ok(Moved {
         shown: sample(&SHOWN)?,
         example_error: example_error(given, &basis, q.as_ref(), r.as_ref(), &*to)?,
-        turned: newly.count(),
+        turned: newly.iter().map(Vec::len).sum(),
     })
 }
 
@@ -188,13 +177,13 @@ fn example_error(
     to: &dyn Space,
 ) -> Result<f64, ExhibitError> {
     let x = basis.coordinates(q).map_err(ExhibitError::of(NAME))?;
-    let moved = crate::signal::transfer::frames_of_coordinates(x.as_ref(), r);
+    let moved = frames_of_coordinates(x.as_ref(), r);
     let moved = moved.map_err(ExhibitError::of(NAME))?;
-    let frames = crate::shape::decode_all(to, moved.as_ref()).map_err(ExhibitError::of(NAME))?;
+    let frames = decode_all(to, moved.as_ref()).map_err(ExhibitError::of(NAME))?;
     let gaps = frames
         .iter()
         .zip(given.target.positions())
         .map(|(a, b)| (a - b).abs());
-    let diagonal = crate::mesh::measure::bounds(given.target.frame(0)).diagonal();
+    let diagonal = bounds(given.target.frame(0)).diagonal();
     Ok(gaps.fold(0.0, f64::max) / diagonal)
 }

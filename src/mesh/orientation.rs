@@ -56,6 +56,26 @@ impl<'a> Orientation<'a> {
         faces.filter(is_turned).map(|f| f as u32).collect()
     }
 
+    /// Faces that are turned in any of these frames (3V positions each), ascending, each once.
+    pub fn turned_in_any(&self, frames: &[f64]) -> Vec<u32> {
+        let each = frames.chunks_exact(self.reference.len().max(1));
+        let mut turned: Vec<u32> = each.flat_map(|frame| self.turned(frame)).collect();
+        turned.sort_unstable();
+        turned.dedup();
+        turned
+    }
+
+    /// Of each frame (3V positions) the faces that are turned in it and not among `before`, which ascend.
+    pub fn newly_turned(&self, frames: &[f64], before: &[u32]) -> Vec<Vec<u32>> {
+        let newly = |frame: &[f64]| {
+            let mut turned = self.turned(frame);
+            turned.retain(|face| before.binary_search(face).is_err());
+            turned
+        };
+        let each = frames.chunks_exact(self.reference.len().max(1));
+        each.map(newly).collect()
+    }
+
     fn rotation(&self, face: [u32; 3], frame: &[f64]) -> Matrix {
         let mut around: Vec<u32> = face
             .iter()

@@ -127,12 +127,13 @@ pub(super) fn table(record: &Record, published: &[PublishedRow]) -> String {
 
 fn compared(rows: &[Row]) -> String {
     let cells = |time: &Time| {
-        let [signal, rest @ ..] = time.words().map(|word| escape(&word));
-        let mut cells = vec![Cell::text(signal)];
+        let [signal, ours, rest @ ..] = time.words().map(|word| escape(&word));
+        let ours = match time.ours {
+            Some(row) => Cell::number(ours).titled(&row.case),
+            None => Cell::number(ours),
+        };
+        let mut cells = vec![Cell::text(signal), ours];
         cells.extend(rest.map(Cell::number));
-        if let Some(ours) = time.ours {
-            cells[1] = Cell::number(escape(&time.words()[1])).titled(&ours.case);
-        }
         cells
     };
     let [first, rest @ ..] = HEADS;

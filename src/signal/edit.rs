@@ -446,7 +446,6 @@ fn through_targets(spline: &Spline, first: usize, targets: &[Point]) -> Vec<Poin
 mod tests {
     use super::super::distance;
     use super::super::fit::{FitOptions, fit};
-    use super::super::knots::KnotRule;
     use super::*;
     use faer::Mat;
     use proptest::prelude::*;
@@ -459,13 +458,7 @@ mod tests {
             let t = i as f64 * 0.4;
             (t + a as f64).sin() + 0.3 * (0.5 * t * (1.0 + a as f64 * 0.1)).cos()
         });
-        let options = FitOptions {
-            k,
-            l: n / 2,
-            m: 5,
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(k, n / 2, 5);
         fit(z.as_ref(), &options).unwrap().representation
     }
 

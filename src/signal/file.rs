@@ -271,7 +271,6 @@ mod tests {
     use crate::shape::patches;
     use crate::signal::fit::FitOptions;
     use crate::signal::in_space::fit_in_space;
-    use crate::signal::knots::KnotRule;
 
     #[test]
     fn patches_are_stored_and_needed() {
@@ -282,13 +281,7 @@ mod tests {
         let labels = labels.unwrap();
         assert!(labels.contains(&1));
         let space = prepare(SpaceKind::Patch, mesh.clone(), sequence.frame(0), &labels);
-        let options = FitOptions {
-            k: n + 2,
-            l: n,
-            m: n - 1,
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n + 2, n, n - 1);
         let fit = fit_in_space(&*space.unwrap(), sequence.positions(), &options).unwrap();
         assert!(fit.rms < 1e-9, "{}", fit.rms);
         let mut stored = Stored {

@@ -169,33 +169,40 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 /// candidate site, and the others come after all candidates, so that l = n still interpolates. Where (2) then still exceeds 8 times (3) + (4), the
 /// mark of sites so close that g swings between them, wider poses are tried, with one site each, on a fixed ladder, and the least (2) is kept.
 pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitError> {
-    check_ranges(frames.ncols(), options)?;
-    validate_pins(&options.pins, frames.ncols())?;
+    let n = frames.ncols();
+    let most_m = n.saturating_sub(1);
+    check_ranges(
+        n,
+        &[
+            ("k", options.k, 4, n + 2),
+            ("l", options.l, 3, n),
+            ("m", options.m, 0, most_m),
+        ],
+    )?;
+    validate_pins(&options.pins, n)?;
     let base = Base::new(frames, options.m, &options.pins)?;
     base.fit(options.k, options.l, options.knots)
 }
 
-fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
-    if n < FEWEST_FRAMES {
-        return Err(FitError::TooFewFrames { found: n });
+/// An error unless there are enough frames and each constant, by name, lies between its least and its greatest value.
+pub(super) fn check_ranges(
+    frames: usize,
+    ranges: &[(&'static str, usize, usize, usize)],
+) -> Result<(), FitError> {
+    if frames < FEWEST_FRAMES {
+        return Err(FitError::TooFewFrames { found: frames });
     }
-    let ranges = [
-        ("k", options.k, 4, n + 2),
-        ("l", options.l, 3, n),
-        ("m", options.m, 0, n - 1),
-    ];
-    for (name, value, low, high) in ranges {
-        if value < low || value > high {
-            return Err(FitError::OutOfRange {
-                name,
-                value,
-                low,
-                high,
-                frames: n,
-            });
-        }
+    let outside = |&&(_, value, low, high): &&(_, usize, usize, usize)| value < low || value > high;
+    match ranges.iter().find(outside) {
+        None => Ok(()),
+        Some(&(name, value, low, high)) => Err(FitError::OutOfRange {
+            name,
+            value,
+            low,
+            high,
+            frames,
+        }),
     }
-    Ok(())
 }
 
 /// What k and l do not change: the shape signal and the pose-space positions.
@@ -438,11 +445,8 @@ mod tests {
 
     fn options(k: usize, l: usize, m: usize) -> FitOptions {
         FitOptions {
-            k,
-            l,
-            m,
             knots: KnotRule::Literal,
-            pins: Vec::new(),
+            ..FitOptions::new(k, l, m)
         }
     }
 

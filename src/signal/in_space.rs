@@ -99,11 +99,9 @@ pub fn fit_in_space_to_rms_refined(
 fn interpolate(z: MatRef<'_, f64>, knots: KnotRule, pins: &[Pin]) -> Result<Fit, FitError> {
     let n = z.ncols();
     let options = FitOptions {
-        k: n + 2,
-        l: n,
-        m: n - 1,
         knots,
         pins: pins.to_vec(),
+        ..FitOptions::new(n + 2, n, n - 1)
     };
     fit(z, &options)
 }
@@ -203,13 +201,7 @@ mod tests {
             &[],
         )
         .unwrap();
-        let options = FitOptions {
-            k: n + 2,
-            l: n,
-            m: n - 1,
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n + 2, n, n - 1);
         let found = fit_in_space(&*space, sequence.positions(), &options).unwrap();
         assert!(found.rms < 1e-9, "{}", found.rms);
     }

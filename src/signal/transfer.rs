@@ -5,7 +5,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::fit::{Base, FEWEST_FRAMES, Fit, FitError};
+use super::fit::{Base, Fit, FitError, check_ranges};
 use super::h::ShapeSignal;
 use super::knots::KnotRule;
 use super::pins::{Pin, validate_pins};
@@ -182,21 +182,7 @@ impl ExampleBasis {
         pins: &[Pin],
     ) -> Result<Fit, TransferError> {
         let n = frames.ncols();
-        if n < FEWEST_FRAMES {
-            return Err(FitError::TooFewFrames { found: n }.into());
-        }
-        for (name, value, low, high) in [("k", k, 4, n + 2), ("l", l, 3, n)] {
-            if !(low..=high).contains(&value) {
-                return Err(FitError::OutOfRange {
-                    name,
-                    value,
-                    low,
-                    high,
-                    frames: n,
-                }
-                .into());
-            }
-        }
+        check_ranges(n, &[("k", k, 4, n + 2), ("l", l, 3, n)])?;
         validate_pins(pins, n).map_err(FitError::from)?;
         let shape = ShapeSignal {
             offset: self.offset.clone(),
@@ -220,20 +206,23 @@ fn differences(examples: MatRef<'_, f64>) -> Result<(Vec<f64>, Mat<f64>), Transf
     Ok((offset, basis))
 }
 
+fn paired(source_examples: usize, target_examples: usize) -> Result<(), TransferError> {
+    match source_examples == target_examples {
+        true => Ok(()),
+        false => Err(TransferError::Unpaired {
+            source_examples,
+            target_examples,
+        }),
+    }
+}
+
 /// psi' : I -> S', the representation over an [`ExampleBasis`] with the examples of the other mesh in its place, as the columns of a d' x (m + 1) matrix.
 /// Where psi shows example j of the source, psi' shows example j of the target. O(d' m).
 pub fn replace_shape(
     over_examples: Representation,
     target: MatRef<'_, f64>,
 ) -> Result<Representation, TransferError> {
-    let source_examples = over_examples.basis.ncols() + 1;
-    let target_examples = target.ncols();
-    if source_examples != target_examples {
-        return Err(TransferError::Unpaired {
-            source_examples,
-            target_examples,
-        });
-    }
+    paired(over_examples.basis.ncols() + 1, target.ncols())?;
     let (offset, basis) = differences(target)?;
     Ok(Representation {
         offset,
@@ -248,13 +237,7 @@ pub fn frames_of_coordinates(
     target: MatRef<'_, f64>,
 ) -> Result<Mat<f64>, TransferError> {
     let (offset, basis) = differences(target)?;
-    let (source_examples, target_examples) = (coordinates.nrows() + 1, target.ncols());
-    if source_examples != target_examples {
-        return Err(TransferError::Unpaired {
-            source_examples,
-            target_examples,
-        });
-    }
+    paired(coordinates.nrows() + 1, target.ncols())?;
     let columns: Vec<Vec<f64>> = (0..coordinates.ncols())
         .into_par_iter()
         .map(|i| {
@@ -313,13 +296,7 @@ mod tests {
 
     fn interpolating(z: &Mat<f64>) -> Representation {
         let n = z.ncols();
-        let options = FitOptions {
-            k: n + 2,
-            l: n,
-            m: n - 1,
-            knots: KnotRule::Symmetric,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n + 2, n, n - 1);
         fit(z.as_ref(), &options).unwrap().representation
     }
 

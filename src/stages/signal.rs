@@ -362,12 +362,10 @@ pub fn transfer_inputs(sequence: &Sequence, choice: &Choice) -> Result<Bundle, S
 
 fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let frames: Mat<f64> = inputs.matrix("Z")?;
+    let [k, l, m] = ["k", "l", "m"].map(|name| inputs.integer(name));
     let options = FitOptions {
-        k: inputs.integer("k")?,
-        l: inputs.integer("l")?,
-        m: inputs.integer("m")?,
         knots: rule(inputs)?,
-        pins: Vec::new(),
+        ..FitOptions::new(k?, l?, m?)
     };
     let n = frames.ncols();
     call(
@@ -438,11 +436,8 @@ impl Choice {
     /// The whole reconstruction with these constants.
     pub fn fit(&self, frames: MatRef<'_, f64>) -> Result<Fit, StageError> {
         let options = FitOptions {
-            k: self.k,
-            l: self.l,
-            m: self.m,
             knots: self.knots,
-            pins: Vec::new(),
+            ..FitOptions::new(self.k, self.l, self.m)
         };
         fit(frames, &options).map_err(StageError::from_error)
     }

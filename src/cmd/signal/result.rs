@@ -9,7 +9,6 @@ use super::super::Failure;
 use super::super::output::{check_place, draft_json};
 use super::sample::frames_at;
 use crate::mesh::orientation::Orientation;
-use crate::sequence::Sequence;
 use crate::sequence::format::write;
 use crate::signal::file::{Stored, save};
 
@@ -53,9 +52,12 @@ impl Outputs {
         let n = stored.representation.time.frame_count();
         let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         let sequence = frames_at(stored, &times, Path::new("the new representation"))?;
-        let [before, turned] = turned_faces(&sequence, examples);
+        let faces = sequence.connectivity().faces();
+        let orientation = Orientation::new(&examples[..sequence.dimension()], faces);
+        let before = orientation.turned_in_any(examples);
+        let turned = orientation.newly_turned(sequence.positions(), &before);
         numbers["faces_turned"] = turned.iter().map(Vec::len).sum::<usize>().into();
-        numbers["faces_turned_in_examples"] = before[0].len().into();
+        numbers["faces_turned_in_examples"] = before.len().into();
         numbers["turned"] = turned.into();
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -68,24 +70,4 @@ impl Outputs {
         }
         Ok(numbers)
     }
-}
-
-/// Faces that are inside out in an example (one list), and those that are in each frame but in no example.
-fn turned_faces(sequence: &Sequence, examples: &[f64]) -> [Vec<Vec<u32>>; 2] {
-    let d = sequence.dimension();
-    let orientation = Orientation::new(&examples[..d], sequence.connectivity().faces());
-    let mut before: Vec<u32> = examples
-        .chunks_exact(d)
-        .flat_map(|e| orientation.turned(e))
-        .collect();
-    before.sort_unstable();
-    before.dedup();
-    let frames = 0..sequence.frame_count();
-    let newly = frames.map(|i| {
-        let mut turned = orientation.turned(sequence.frame(i));
-        turned.retain(|f| before.binary_search(f).is_err());
-        turned
-    });
-    let newly = newly.collect();
-    [vec![before], newly]
 }

@@ -30,12 +30,11 @@ fn lengths(inputs: &Bundle, outputs: &Bundle) -> Result<[f64; 3], ArrayError> {
 pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let [found, straight, expected] = lengths(inputs, outputs)?;
     let [error, straight] = [found, straight].map(|l| share((l - expected).abs(), expected));
-    let mut measured = vec![("length_error", error), ("length_error_of_means", straight)];
-    // In vertex space there is nothing else to be.
-    if inputs.text("space")? != "vertex" {
-        measured.push(("share_of_means", share(error, straight)));
-    }
-    Ok(measured)
+    Ok(vec![
+        ("length_error", error),
+        ("length_error_of_means", straight),
+        ("share_of_means", share(error, straight)),
+    ])
 }
 
 pub fn against(
@@ -44,10 +43,5 @@ pub fn against(
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
     let [[a, _, expected], [b, ..]] = [lengths(inputs, ours)?, lengths(inputs, theirs)?];
-    // Means of positions are what the others are to differ from.
-    let name = match inputs.text("space")? {
-        "vertex" => "length_shrunk_by_means",
-        _ => "length_difference",
-    };
-    Ok(vec![(name, share((a - b).abs(), expected))])
+    Ok(vec![("length_difference", share((a - b).abs(), expected))])
 }

@@ -4,7 +4,7 @@ use faer::{Accum, Mat, MatRef};
 
 use super::projection::{Problem, Projection, Unknowns, scale_rows};
 use crate::linalg::banded::BAND;
-use crate::linalg::dense::{multiply, solve_positive};
+use crate::linalg::dense::{Cholesky, multiply};
 use crate::signal::basis::Local;
 use crate::signal::thin_plate::kernel_gradients;
 
@@ -110,7 +110,9 @@ impl Normal {
         for i in 0..n {
             damped[(i, i)] += damping * self.matrix[(i, i)].max(LEAST_DIAGONAL * most);
         }
-        solve_positive(damped, self.descent.clone())
+        let mut step = self.descent.clone();
+        Cholesky::new(damped)?.solve(step.col_as_slice_mut(0));
+        Some(step)
     }
 
     /// What the linearised problem promises a step to take off the error.

@@ -17,13 +17,7 @@ fn frames(d: usize, n: usize) -> Mat<f64> {
 }
 
 fn options(k: usize, l: usize, m: usize) -> FitOptions {
-    FitOptions {
-        k,
-        l,
-        m,
-        knots: KnotRule::Symmetric,
-        pins: Vec::new(),
-    }
+    FitOptions::new(k, l, m)
 }
 
 fn measured(frames: &Mat<f64>, fit: &Fit) -> f64 {
