@@ -8,3 +8,4 @@ pub mod kernels;
 pub mod pca;
 pub mod rotation;
 pub mod sparse;
+pub mod sweeps;

@@ -1,8 +1,7 @@
 //! Sparse symmetric positive definite systems: a pattern is analysed once, numbers are factored often, right-hand sides are solved often.
 //!
 //! P A P^T = L L^T, with a fill-reducing order P by approximate minimum degree and L kept in supernodes (runs of columns with one pattern of rows,
-//! stored as dense column-major blocks), both by faer. The triangular solves are our own: right-hand sides are kept side by side, so that every
-//! entry of L is read once a sweep for all of them.
+//! stored as dense column-major blocks), both by faer. The triangular solves are our own (`sweeps`).
 
 use std::sync::Arc;
 
@@ -15,7 +14,8 @@ use faer::sparse::linalg::cholesky::{simplicial, supernodal};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use thiserror::Error;
 
-use super::kernels::{clear_upper_halves, vectorised};
+use super::kernels::clear_upper_halves;
+use super::sweeps::{Supernode, Sweeps};
 
 /// Why a sparse system has no factor.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -64,7 +64,9 @@ struct Analysis {
 #[derive(Clone, Debug)]
 pub struct Factor {
     analysis: Arc<Analysis>,
+    /// L as it is factored, and as it is solved with.
     values: Vec<f64>,
+    sweeps: Sweeps,
 }
 
 impl Pattern {
@@ -84,17 +86,16 @@ impl Pattern {
         if n.max(entries.len()) >= i32::MAX as usize {
             return Err(FactorError::TooLarge { n });
         }
-        let (order, position) =
-            minimum_degree(&Compressed::new(n, entries, |[r, c]| [r.min(c), r.max(c)]))?;
-        let moved = |[r, c]: [u32; 2]| [position[r as usize], position[c as usize]];
-        let upper = Compressed::new(n, entries, |e| {
-            let [r, c] = moved(e);
-            [r.min(c), r.max(c)]
-        });
-        let lower = Compressed::new(n, entries, |e| {
-            let [r, c] = moved(e);
-            [r.max(c), r.min(c)]
-        });
+        let given = Compressed::new(n, entries.iter().map(|&[r, c]| [r.min(c), r.max(c)]));
+        let (order, position) = minimum_degree(&given)?;
+        let moved = given.entries().map(|e| e.map(|i| position[i as usize]));
+        let mut lower = Compressed::new(n, moved.map(|[r, c]| [r.max(c), r.min(c)]));
+        let upper = Compressed::new(n, lower.entries().map(|[row, column]| [column, row]));
+        lower.slots = given
+            .slots
+            .iter()
+            .map(|&s| lower.slots[s as usize])
+            .collect();
         let symbolic = supernodes(&upper)?;
         Ok(Self(Arc::new(Analysis {
             n,
@@ -119,6 +120,7 @@ impl Pattern {
         let mut factor = Factor {
             analysis: self.0.clone(),
             values: vec![0.0; self.factor_len()],
+            sweeps: Sweeps::default(),
         };
         factor.refactor(values)?;
         Ok(factor)
@@ -155,12 +157,14 @@ impl Factor {
             Default::default(),
         );
         clear_upper_halves();
-        match factored {
-            Ok(_) => Ok(()),
-            Err(LltError::NonPositivePivot { index }) => {
-                Err(FactorError::NotPositiveDefinite { pivot: index, n })
-            }
+        if let Err(LltError::NonPositivePivot { index }) = factored {
+            return Err(FactorError::NotPositiveDefinite { pivot: index, n });
         }
+        self.sweeps.clear();
+        for supernode in each_supernode(symbolic, &self.values) {
+            self.sweeps.push(supernode);
+        }
+        Ok(())
     }
 
     /// Number of unknowns.
@@ -175,13 +179,13 @@ impl Factor {
             scratch,
             |[a, b, c]| [a, b, c, 0.0],
             |[a, b, c, _]| [a, b, c],
-            solve_four,
+            Sweeps::solve4,
         );
     }
 
     /// Replaces one right-hand side by its solution.
     pub fn solve1(&self, x: &mut [f64], scratch: &mut Vec<[f64; 1]>) {
-        self.permuted(x, scratch, |a| [a], |[a]| a, solve_one);
+        self.permuted(x, scratch, |a| [a], |[a]| a, Sweeps::solve1);
     }
 
     fn permuted<T: Copy, L: Copy>(
@@ -190,169 +194,33 @@ impl Factor {
         scratch: &mut Vec<L>,
         widen: impl Fn(T) -> L,
         narrow: impl Fn(L) -> T,
-        solve: impl Fn(&Analysis, &[f64], &mut [L]),
+        solve: impl Fn(&Sweeps, &mut [L]),
     ) {
         let order = &self.analysis.order;
         scratch.clear();
         scratch.extend(order.iter().map(|&i| widen(x[i as usize])));
-        solve(&self.analysis, &self.values, scratch);
+        solve(&self.sweeps, scratch);
         for (&i, &solved) in order.iter().zip(scratch.iter()) {
             x[i as usize] = narrow(solved);
         }
     }
 }
 
-vectorised! {
-    /// Four right-hand sides.
-    fn solve_four(analysis: &Analysis, values: &[f64], x: &mut [[f64; 4]]) {
-        forward(analysis, values, x);
-        backward(analysis, values, x);
-    }
-}
-
-vectorised! {
-    /// One right-hand side.
-    fn solve_one(analysis: &Analysis, values: &[f64], x: &mut [[f64; 1]]) {
-        forward(analysis, values, x);
-        backward(analysis, values, x);
-    }
-}
-
-/// Columns of L taken together in a sweep.
-const WIDTH: usize = 4;
-
-/// L y = b.
-#[inline(always)]
-fn forward<const N: usize>(analysis: &Analysis, values: &[f64], x: &mut [[f64; N]]) {
-    for s in 0..analysis.symbolic.n_supernodes() {
-        let block = Block::new(analysis, values, s);
-        for first in (0..block.columns).step_by(WIDTH) {
-            let last = (first + WIDTH).min(block.columns);
-            for j in first..last {
-                let column = block.column(j);
-                let pivot = 1.0 / column[j];
-                x[block.start + j] = x[block.start + j].map(|v| v * pivot);
-                let y = x[block.start + j];
-                for i in j + 1..last {
-                    minus(&mut x[block.start + i], column[i], y);
-                }
-            }
-            match last - first {
-                4 => block.push::<4, N>(first, x),
-                3 => block.push::<3, N>(first, x),
-                2 => block.push::<2, N>(first, x),
-                _ => block.push::<1, N>(first, x),
-            }
-        }
-    }
-}
-
-/// L^T x = y.
-#[inline(always)]
-fn backward<const N: usize>(analysis: &Analysis, values: &[f64], x: &mut [[f64; N]]) {
-    for s in (0..analysis.symbolic.n_supernodes()).rev() {
-        let block = Block::new(analysis, values, s);
-        for first in (0..block.columns).step_by(WIDTH).rev() {
-            let last = (first + WIDTH).min(block.columns);
-            match last - first {
-                4 => block.pull::<4, N>(first, x),
-                3 => block.pull::<3, N>(first, x),
-                2 => block.pull::<2, N>(first, x),
-                _ => block.pull::<1, N>(first, x),
-            }
-            for j in (first..last).rev() {
-                let column = block.column(j);
-                let mut y = x[block.start + j];
-                for i in j + 1..last {
-                    minus(&mut y, column[i], x[block.start + i]);
-                }
-                let pivot = 1.0 / column[j];
-                x[block.start + j] = y.map(|v| v * pivot);
-            }
-        }
-    }
-}
-
-/// A supernode: `columns` columns of L from `start` on, each with the rows of the diagonal block and then those of `pattern`.
-struct Block<'a> {
-    start: usize,
-    columns: usize,
-    pattern: &'a [u32],
+/// The supernodes of L with their values, in the order of elimination.
+fn each_supernode<'a>(
+    symbolic: &'a supernodal::SymbolicSupernodalCholesky<u32>,
     values: &'a [f64],
-}
-
-impl<'a> Block<'a> {
-    #[inline(always)]
-    fn new(analysis: &'a Analysis, values: &'a [f64], s: usize) -> Self {
-        let symbolic = &analysis.symbolic;
-        let start = symbolic.supernode_begin()[s] as usize;
-        let rows = symbolic.col_ptr_for_row_idx()[s] as usize
-            ..symbolic.col_ptr_for_row_idx()[s + 1] as usize;
-        let numbers =
-            symbolic.col_ptr_for_val()[s] as usize..symbolic.col_ptr_for_val()[s + 1] as usize;
-        Self {
-            start,
-            columns: symbolic.supernode_end()[s] as usize - start,
-            pattern: &symbolic.row_idx()[rows],
-            values: &values[numbers],
+) -> impl Iterator<Item = Supernode<'a>> {
+    (0..symbolic.n_supernodes()).map(move |s| {
+        let first = symbolic.supernode_begin()[s] as usize;
+        let between = |starts: &[u32]| starts[s] as usize..starts[s + 1] as usize;
+        Supernode {
+            first,
+            columns: symbolic.supernode_end()[s] as usize - first,
+            pattern: &symbolic.row_idx()[between(symbolic.col_ptr_for_row_idx())],
+            values: &values[between(symbolic.col_ptr_for_val())],
         }
-    }
-
-    #[inline(always)]
-    fn column(&self, j: usize) -> &'a [f64] {
-        let rows = self.columns + self.pattern.len();
-        &self.values[j * rows..(j + 1) * rows]
-    }
-
-    /// Subtracts W solved columns from the rows below them.
-    #[inline(always)]
-    fn push<const W: usize, const N: usize>(&self, first: usize, x: &mut [[f64; N]]) {
-        let y: [[f64; N]; W] = std::array::from_fn(|w| x[self.start + first + w]);
-        let split = |w: usize| self.column(first + w).split_at(self.columns);
-        let inside: [&[f64]; W] = std::array::from_fn(|w| split(w).0);
-        let below: [&[f64]; W] = std::array::from_fn(|w| &split(w).1[..self.pattern.len()]);
-        for i in first + W..self.columns {
-            let target = &mut x[self.start + i];
-            for w in 0..W {
-                minus(target, inside[w][i], y[w]);
-            }
-        }
-        for (i, &row) in self.pattern.iter().enumerate() {
-            let target = &mut x[row as usize];
-            for w in 0..W {
-                minus(target, below[w][i], y[w]);
-            }
-        }
-    }
-
-    /// Subtracts the rows below W columns from their unknowns.
-    #[inline(always)]
-    fn pull<const W: usize, const N: usize>(&self, first: usize, x: &mut [[f64; N]]) {
-        let mut y: [[f64; N]; W] = std::array::from_fn(|w| x[self.start + first + w]);
-        let split = |w: usize| self.column(first + w).split_at(self.columns);
-        let inside: [&[f64]; W] = std::array::from_fn(|w| split(w).0);
-        let below: [&[f64]; W] = std::array::from_fn(|w| &split(w).1[..self.pattern.len()]);
-        for i in first + W..self.columns {
-            for w in 0..W {
-                minus(&mut y[w], inside[w][i], x[self.start + i]);
-            }
-        }
-        for (i, &row) in self.pattern.iter().enumerate() {
-            let solved = x[row as usize];
-            for w in 0..W {
-                minus(&mut y[w], below[w][i], solved);
-            }
-        }
-        x[self.start + first..self.start + first + W].copy_from_slice(&y);
-    }
-}
-
-/// y -= a x.
-#[inline(always)]
-fn minus<const N: usize>(y: &mut [f64; N], a: f64, x: [f64; N]) {
-    for lane in 0..N {
-        y[lane] -= a * x[lane];
-    }
+    })
 }
 
 /// Entries by columns, rows ascending.
@@ -365,33 +233,39 @@ struct Compressed {
 }
 
 impl Compressed {
-    /// Sorts the entries [row, column] that `place` makes of the given ones, by counting; equal ones share a slot.
-    fn new(n: usize, entries: &[[u32; 2]], place: impl Fn([u32; 2]) -> [u32; 2]) -> Self {
-        let placed: Vec<[u32; 2]> = entries.iter().map(|&e| place(e)).collect();
-        let given: Vec<u32> = (0..entries.len() as u32).collect();
-        let by_row = counting_sort(n, &given, |e| placed[e as usize][0]);
-        let sorted = counting_sort(n, &by_row, |e| placed[e as usize][1]);
+    /// Sorts entries [row, column] by columns and then by rows; equal ones share a slot. O(n + entries).
+    fn new(n: usize, entries: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+        let given = entries.zip(0..);
+        let by_rows = Buckets::new(n, given.map(|([row, column], e)| (row, [column, e])));
+        let sorted = Buckets::new(n, by_rows.iter().map(|(row, [c, e])| (c, [row, e])));
         let mut starts = vec![0; n + 1];
-        let mut rows = Vec::new();
-        let mut slots = vec![0; entries.len()];
-        let mut before = None;
-        for &e in &sorted {
-            let [row, column] = placed[e as usize];
-            if before != Some([row, column]) {
-                rows.push(row);
-                starts[column as usize + 1] += 1;
-                before = Some([row, column]);
+        let mut rows = Vec::with_capacity(sorted.items.len());
+        let mut slots = vec![0; sorted.items.len()];
+        for column in 0..n {
+            let mut before = None;
+            for &[row, e] in sorted.of(column) {
+                if before != Some(row) {
+                    rows.push(row);
+                    before = Some(row);
+                }
+                slots[e as usize] = rows.len() as u32 - 1;
             }
-            slots[e as usize] = rows.len() as u32 - 1;
-        }
-        for j in 0..n {
-            starts[j + 1] += starts[j];
+            starts[column + 1] = rows.len() as u32;
         }
         Self {
             starts,
             rows,
             slots,
         }
+    }
+
+    /// The entries [row, column], in order.
+    fn entries(&self) -> impl Iterator<Item = [u32; 2]> + Clone {
+        let columns = self.starts.windows(2).zip(0..);
+        columns.flat_map(|(range, column)| {
+            let rows = &self.rows[range[0] as usize..range[1] as usize];
+            rows.iter().map(move |&row| [row, column])
+        })
     }
 
     fn pattern(&self, n: usize) -> SymbolicSparseColMatRef<'_, u32> {
@@ -407,22 +281,39 @@ impl Compressed {
     }
 }
 
-/// Items ordered by a key below n; equal keys keep their order.
-fn counting_sort(n: usize, items: &[u32], key: impl Fn(u32) -> u32) -> Vec<u32> {
-    let mut next = vec![0usize; n + 1];
-    for &item in items {
-        next[key(item) as usize + 1] += 1;
+/// Items by keys below n; those of one key keep their order.
+struct Buckets {
+    starts: Vec<u32>,
+    items: Vec<[u32; 2]>,
+}
+
+impl Buckets {
+    fn new(n: usize, keyed: impl Iterator<Item = (u32, [u32; 2])> + Clone) -> Self {
+        let mut starts = vec![0u32; n + 1];
+        for (key, _) in keyed.clone() {
+            starts[key as usize + 1] += 1;
+        }
+        for key in 0..n {
+            starts[key + 1] += starts[key];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![[0; 2]; starts[n] as usize];
+        for (key, item) in keyed {
+            let place = &mut next[key as usize];
+            items[*place as usize] = item;
+            *place += 1;
+        }
+        Self { starts, items }
     }
-    for k in 0..n {
-        next[k + 1] += next[k];
+
+    fn of(&self, key: usize) -> &[[u32; 2]] {
+        &self.items[self.starts[key] as usize..self.starts[key + 1] as usize]
     }
-    let mut sorted = vec![0; items.len()];
-    for &item in items {
-        let place = &mut next[key(item) as usize];
-        sorted[*place] = item;
-        *place += 1;
+
+    fn iter(&self) -> impl Iterator<Item = (u32, [u32; 2])> + Clone {
+        let keys = 0..self.starts.len() - 1;
+        keys.flat_map(|key| self.of(key).iter().map(move |&item| (key as u32, item)))
     }
-    sorted
 }
 
 /// A fill-reducing order of the unknowns, and its inverse.
