@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::Point;
 use super::thin_plate::{Frame, kernels};
 use crate::linalg::dense::Qr;
-use crate::linalg::kernels::{axpy, combine};
+use crate::linalg::kernels::{axpy, combine, combine4};
 
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
@@ -116,8 +116,16 @@ impl PoseSignal {
         for first in (0..l).step_by(COLUMNS) {
             let last = (first + COLUMNS).min(l);
             let column = |j: usize| self.coefficients.col_as_slice(first + j + 1);
-            for (i, x) in values.chunks_exact_mut(m).enumerate() {
-                combine(&bends[i * l + first..i * l + last], column, x);
+            let weights = |i: usize| &bends[i * l + first..i * l + last];
+            let mut fours = values.chunks_exact_mut(4 * m);
+            for (four, x) in fours.by_ref().enumerate() {
+                let (low, high) = x.split_at_mut(2 * m);
+                let ((x0, x1), (x2, x3)) = (low.split_at_mut(m), high.split_at_mut(m));
+                let weights = [0, 1, 2, 3].map(|i| weights(4 * four + i));
+                combine4(weights, column, [x0, x1, x2, x3]);
+            }
+            for (i, x) in fours.into_remainder().chunks_exact_mut(m).enumerate() {
+                combine(weights(points.len() / 4 * 4 + i), column, x);
             }
         }
         for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
