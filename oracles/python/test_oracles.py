@@ -13,6 +13,7 @@ import test_edits
 import test_halfway
 import test_layout
 import test_poisson
+import test_quality
 import test_shapes
 from checking import Oracle, check, close, failures
 
@@ -278,6 +279,7 @@ if __name__ == "__main__":
     test_poisson.run(np.random.default_rng(7))
     test_halfway.run()
     test_edits.run(np.random.default_rng(8))
+    test_quality.run()
     test_layout.run(np.random.default_rng(9))
     print(f"{len(failures)} failed" if failures else "all passed")
     sys.exit(bool(failures))
