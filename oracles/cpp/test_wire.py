@@ -19,6 +19,7 @@ sys.path.insert(0, str(FOLDER.parent / "python"))
 import checking  # noqa: E402
 import test_halfway  # noqa: E402
 import test_poisson  # noqa: E402
+import test_quality  # noqa: E402
 import test_shapes  # noqa: E402
 from wire import read_message, write_message  # noqa: E402
 
@@ -125,6 +126,21 @@ def check_halfway(oracle):
     settle()
 
 
+def check_quality(oracle):
+    """The closed forms of python/test_quality.py, which asks the Python oracles the same."""
+
+    def request(**inputs):
+        return oracle.run("mesh.quality", **inputs)
+
+    def ask(frames, F):
+        return {name[4:]: value for name, value in request(frames=frames, F=F).items() if name.startswith("out.")}
+
+    test_quality.check_measures("cgal", ask, 1e-14)
+    test_quality.check_faces("cgal", ask, exactly=True)
+    test_quality.check_refusals("cgal", lambda **inputs: request(**inputs)["status"])
+    settle()
+
+
 def check_rho(oracle):
     query = np.linspace(1, 6, 31)
     near(oracle.run("signal.rho", t=2 * np.arange(6.0), query=query), values=2 * (query - 1), slopes=np.full(6, 2.0))
@@ -185,6 +201,7 @@ def check_manners(command, stage):
 PROGRAMS = [
     ([str(BUILD / "sequence_read_openmesh")], "sequence.read", check_read),
     ([str(BUILD / "sequence_distance_cgal")], "sequence.distance", check_distance),
+    ([str(BUILD / "mesh_quality_cgal")], "mesh.quality", check_quality),
     ([str(BUILD / "shape_lengths_openmesh")], "shape.lengths_encode", check_lengths),
     ([str(BUILD / "shape_halfway_cgal")], "shape.halfway", check_halfway),
     ([str(BUILD / "shape_poisson_cholmod")], "shape.poisson_factor", check_poisson),

@@ -118,12 +118,16 @@ def _part(P, delta, free):
 
 
 def minimise(X, start, fixed=()):
-    """The local minimum of (6) reached from `start` (n, 2), whose rows `fixed` stay as they are."""
+    """The local minimum of (6) for the distances of X, reached from `start` (n, 2), whose rows `fixed` stay as they are."""
+    return scaling(cdist(X, X), start, fixed)
+
+
+def scaling(delta, start, fixed=()):
+    """The same for any dissimilarities delta (n, n)."""
     free = np.ones(len(start), bool)
     free[np.asarray(fixed, int)] = False
     if not free.any():
         return start.copy()
-    delta = cdist(X, X)
     scale = max(delta.max(), np.ptp(start, axis=0).max()) or 1.0
     delta, P = delta / scale, start / scale
     P = newton(majorise(_part(P, delta, free), delta, free), delta, free) * scale

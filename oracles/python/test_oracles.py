@@ -11,7 +11,10 @@ import numpy as np
 
 import test_edits
 import test_halfway
+import test_layout
 import test_poisson
+import test_quality
+import test_refine
 import test_shapes
 from checking import Oracle, check, close, failures
 
@@ -277,5 +280,8 @@ if __name__ == "__main__":
     test_poisson.run(np.random.default_rng(7))
     test_halfway.run()
     test_edits.run(np.random.default_rng(8))
+    test_quality.run()
+    test_layout.run(np.random.default_rng(9))
+    test_refine.run(np.random.default_rng(10))
     print(f"{len(failures)} failed" if failures else "all passed")
     sys.exit(bool(failures))
