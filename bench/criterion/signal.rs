@@ -11,6 +11,7 @@ use meshseq::signal::fit::{FitOptions, fit};
 use meshseq::signal::g::PoseSignal;
 use meshseq::signal::h::shape_signal;
 use meshseq::signal::knots::{KnotRule, knots};
+use meshseq::signal::layout::Layout;
 use meshseq::signal::mds::{Dissimilarities, scale};
 use meshseq::signal::parameters::centripetal;
 use meshseq::signal::pins::principal_start;
@@ -118,6 +119,7 @@ fn psi(c: &mut Criterion) {
             l: 30,
             m: 42,
             knots: KnotRule::Symmetric,
+            layout: Layout::Mds,
             pins: Vec::new(),
         };
         let r = fit(z.as_ref(), &options).unwrap().representation;
@@ -159,6 +161,7 @@ fn whole(c: &mut Criterion) {
             l: n * 7 / 10,
             m: 40.min(n / 3),
             knots: KnotRule::Symmetric,
+            layout: Layout::Mds,
             pins: Vec::new(),
         };
         group.bench_function(BenchmarkId::new("frames, V = 1000", n), |b| {

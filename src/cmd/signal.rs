@@ -1,4 +1,4 @@
-//! `signal fit` and `signal sample`.
+//! `signal fit` and `signal sample`; `signal leave-out` is in a file of its own.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use faer::MatRef;
 use serde_json::json;
 
+use super::leave_out::LeaveOutVerb;
 use super::output::{check_place, draft_json, say};
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
@@ -18,7 +19,9 @@ use crate::signal::file::{Stored, load, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
 use crate::signal::in_space::{SpaceFit, fit_in_space, fit_in_space_to_rms};
 use crate::signal::knots::KnotRule;
+use crate::signal::layout::Layout;
 use crate::signal::pins::{Pin, validate_pins};
+use crate::signal::saddles::{Place, places};
 
 /// More frames are a mistake.
 const MOST_FRAMES: usize = 10_000_000;
@@ -35,6 +38,9 @@ pub enum Signal {
     /// Frames of a representation at any times
     #[command(after_help = "Example: meshseq signal sample gallop.npz --count 48 -o twice-as-many")]
     Sample(SampleVerb),
+    /// Fit every second frame and predict the others
+    #[command(after_help = "Example: meshseq signal leave-out @gallop-small --json leave-out.json")]
+    LeaveOut(LeaveOutVerb),
 }
 
 impl Signal {
@@ -42,6 +48,7 @@ impl Signal {
         match self {
             Self::Fit(verb) => verb.run(),
             Self::Sample(verb) => verb.run(),
+            Self::LeaveOut(verb) => verb.run(),
         }
     }
 }
@@ -73,6 +80,10 @@ pub struct FitVerb {
     /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
     #[arg(long, default_value = "symmetric", value_name = "RULE")]
     knots: String,
+    /// Layout of the pose plane: mds (the paper's, by distances between poses), ordered (mixed with distances along the motion, which needs no
+    /// pins), or ordered:W with a weight W from 0 to 1
+    #[arg(long, default_value = "mds", value_name = "LAYOUT")]
+    layout: String,
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]
     pins: Option<PathBuf>,
@@ -91,6 +102,7 @@ impl FitVerb {
             .parse()
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
         let space: SpaceKind = self.space.parse()?;
+        let layout: Layout = self.layout.parse()?;
         if let Some(out) = self
             .out
             .as_ref()
@@ -114,8 +126,8 @@ impl FitVerb {
             None => Vec::new(),
         };
         let reference = self.reference(&sequence, space)?;
-        let fitted = self.fit(&sequence, space, &reference, knots, pins)?;
-        let numbers = numbers(&sequence, &fitted, space, knots);
+        let fitted = self.fit(&sequence, space, &reference, knots, layout, pins)?;
+        let numbers = numbers(&sequence, &fitted, space, knots, layout);
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -167,6 +179,7 @@ impl FitVerb {
         space: SpaceKind,
         reference: &[f64],
         knots: KnotRule,
+        layout: Layout,
         pins: Vec<Pin>,
     ) -> Result<SpaceFit, Failure> {
         let constants = match (self.k, self.l, self.m) {
@@ -175,6 +188,7 @@ impl FitVerb {
                 l,
                 m,
                 knots,
+                layout,
                 pins: pins.clone(),
             }),
             _ => None,
@@ -185,7 +199,10 @@ impl FitVerb {
             let frames = MatRef::from_column_major_slice(sequence.positions(), d, n);
             let fit = match &constants {
                 Some(options) => fit(frames, options)?,
-                None => fit_to_error(frames, allowed_error(sequence, tolerance), knots, &pins)?,
+                None => {
+                    let most = allowed_error(sequence, tolerance);
+                    fit_to_error(frames, most, knots, layout, &pins)?
+                }
             };
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
             return Ok(SpaceFit { fit, rms });
@@ -197,7 +214,7 @@ impl FitVerb {
             None => {
                 let size = bounds(sequence.frame(0)).diagonal();
                 let rms = (tolerance * size).max(f64::MIN_POSITIVE);
-                fit_in_space_to_rms(&*prepared, frames, rms, knots, &pins)?
+                fit_in_space_to_rms(&*prepared, frames, rms, knots, layout, &pins)?
             }
         })
     }
@@ -218,6 +235,7 @@ fn numbers(
     found: &SpaceFit,
     space: SpaceKind,
     knots: KnotRule,
+    layout: Layout,
 ) -> serde_json::Value {
     let fit = &found.fit;
     let (k, l, m) = fit.klm();
@@ -228,15 +246,22 @@ fn numbers(
     let distance = found.rms * ((n * vertices) as f64).sqrt();
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
     let t = fit.timings;
+    let astray: Vec<_> = places(fit)
+        .into_iter()
+        .filter(Place::is_astray)
+        .map(|p| json!({"time": p.time, "stray": p.stray, "curvature": p.curvature}))
+        .collect();
     json!({
         "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "V": vertices, "F": sequence.connectivity().faces().len(),
         "space": space.name(), "knots": knots.to_string(),
+        "layout": layout.to_string(), "layout_weight": fit.layout_weight,
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
         "same_pose": fit.same_pose,
+        "astray": astray,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
         "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
     })
@@ -265,8 +290,9 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
     let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
     format!(
-        "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
+        "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
+         {}
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
          ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
         v["space"].as_str().unwrap_or(""),
@@ -275,10 +301,13 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         v["l"],
         v["m"],
         v["knots"].as_str().unwrap_or(""),
+        v["layout"].as_str().unwrap_or(""),
+        v["layout_weight"],
         number("error_h"),
         number("error_g"),
         number("error_f"),
         number("error_psi"),
+        astray_line(&v["astray"]),
         100.0 * number("rms_relative"),
         number("kg_percent"),
         v["stored_numbers"],
@@ -289,6 +318,22 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         t("g"),
         t("f"),
     )
+}
+
+/// How many in-betweens go astray, and which the most.
+fn astray_line(places: &serde_json::Value) -> String {
+    let stray = |p: &serde_json::Value| p["stray"].as_f64().unwrap_or(0.0);
+    let places = places.as_array().map_or(&[][..], Vec::as_slice);
+    let farther = |a, b| if stray(b) > stray(a) { b } else { a };
+    match places.iter().reduce(farther) {
+        Some(worst) => format!(
+            "in-betweens astray: {}, the farthest at t = {}, {:.2} steps off",
+            places.len(),
+            worst["time"],
+            stray(worst)
+        ),
+        None => "in-betweens astray: none".into(),
+    }
 }
 
 /// Rows `frame,x,y` below a header line, with frames of 1 to n.

@@ -7,6 +7,7 @@ use thiserror::Error;
 use super::fidelity::fit_to_error;
 use super::fit::{Fit, FitError, FitOptions, fit};
 use super::knots::KnotRule;
+use super::layout::Layout;
 use super::pins::Pin;
 use super::psi::Representation;
 use crate::shape::{ShapeError, Space, decode_all, encode_all};
@@ -56,6 +57,7 @@ pub fn fit_in_space_to_rms(
     frames: &[f64],
     rms: f64,
     knots: KnotRule,
+    layout: Layout,
     pins: &[Pin],
 ) -> Result<SpaceFit, SpaceFitError> {
     if !(rms > 0.0 && rms.is_finite()) {
@@ -67,7 +69,7 @@ pub fn fit_in_space_to_rms(
     let allowed = rms * rms * frames.len() as f64 / 3.0;
     let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
     for _ in 0..ATTEMPTS {
-        let fit = fit_to_error(z.as_ref(), most.max(f64::MIN_POSITIVE), knots, pins)?;
+        let fit = fit_to_error(z.as_ref(), most.max(f64::MIN_POSITIVE), knots, layout, pins)?;
         let found = rms_after_decoding(space, frames, &fit.representation)?;
         if found <= rms {
             return Ok(SpaceFit { fit, rms: found });
@@ -79,6 +81,7 @@ pub fn fit_in_space_to_rms(
         l: n,
         m: n - 1,
         knots,
+        layout,
         pins: pins.to_vec(),
     };
     let fit = fit(z.as_ref(), &options)?;
@@ -145,6 +148,7 @@ mod tests {
             l: n,
             m: n - 1,
             knots: KnotRule::Symmetric,
+            layout: Layout::Mds,
             pins: Vec::new(),
         };
         let found = fit_in_space(&*space, sequence.positions(), &options).unwrap();
@@ -161,7 +165,16 @@ mod tests {
         )
         .unwrap();
         let symmetric = KnotRule::Symmetric;
-        let fit = |rms| fit_in_space_to_rms(&*space, sequence.positions(), rms, symmetric, &[]);
+        let fit = |rms| {
+            fit_in_space_to_rms(
+                &*space,
+                sequence.positions(),
+                rms,
+                symmetric,
+                Layout::Mds,
+                &[],
+            )
+        };
         let (fine, coarse) = (fit(0.005).unwrap(), fit(0.05).unwrap());
         assert!(fine.rms <= 0.005 && coarse.rms <= 0.05);
         assert!(

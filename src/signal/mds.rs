@@ -54,7 +54,32 @@ impl Dissimilarities {
         Self { n, values }
     }
 
-    fn row(&self, i: usize) -> &[f64] {
+    /// delta_ij of every pair, which must be symmetric and 0 on the diagonal.
+    pub(super) fn from_fn(n: usize, mut delta: impl FnMut(usize, usize) -> f64) -> Self {
+        let mut values = Vec::with_capacity(n * n);
+        for i in 0..n {
+            values.extend((0..n).map(|j| delta(i, j)));
+        }
+        Self { n, values }
+    }
+
+    /// n.
+    pub fn count(&self) -> usize {
+        self.n
+    }
+
+    /// The greatest of them.
+    pub(super) fn greatest(&self) -> f64 {
+        self.values.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The sum of squares over all ordered pairs.
+    pub(super) fn sum_of_squares(&self) -> f64 {
+        norm_squared(&self.values)
+    }
+
+    /// delta_i1 .. delta_in.
+    pub fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.n..(i + 1) * self.n]
     }
 

@@ -12,6 +12,8 @@
 //! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//! | 6 a layout that needs no pins | [`layout`] |
+//! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`natural`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
@@ -26,12 +28,16 @@ pub mod g;
 pub mod h;
 pub mod in_space;
 pub mod knots;
+pub mod layout;
+pub mod leave_out;
 pub mod mds;
+pub mod natural;
 pub mod parameters;
 pub mod pins;
 pub mod poses;
 pub mod psi;
 pub mod rho;
+pub mod saddles;
 pub mod sites;
 pub mod thin_plate;
 

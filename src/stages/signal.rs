@@ -9,6 +9,7 @@ use crate::signal::fit::{Fit, FitOptions, fit};
 use crate::signal::g::PoseSignal;
 use crate::signal::h::shape_signal;
 use crate::signal::knots::{KnotRule, knots};
+use crate::signal::layout::{Distances, Layout};
 use crate::signal::mds::{Dissimilarities, scale};
 use crate::signal::parameters::{centripetal, distinct};
 use crate::signal::pins::{Pin, principal_start, validate_pins};
@@ -32,6 +33,11 @@ pub static STAGES: &[Stage] = &[
         name: "signal.mds_fixed",
         about: "pose-space positions with some of them fixed (section 3.2.1)",
         prepare: mds_fixed,
+    },
+    Stage {
+        name: "signal.layout",
+        about: "pose-space positions by scaling distances mixed with those along the motion (section 6: free of pins)",
+        prepare: layout,
     },
     Stage {
         name: "signal.rbf",
@@ -115,6 +121,41 @@ fn scaling(inputs: &Bundle, pins: Vec<Pin>) -> Result<Box<dyn Call>, StageError>
     call(
         move || Ok(scale(&Dissimilarities::new(x.as_ref()), &start, &pins)),
         |positions| Bundle::from([("P", Array::points(positions))]),
+    )
+}
+
+/// Forming the dissimilarities is part of the work.
+fn layout(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let x = inputs.matrix("X")?;
+    let weight = match inputs.vector("weight")? {
+        [weight] => *weight,
+        other => {
+            return Err(StageError::Failed(format!(
+                "`weight` has {} numbers, expected 1",
+                other.len()
+            )));
+        }
+    };
+    let ordered = Layout::Ordered {
+        weight: Some(weight),
+    };
+    ordered.check().map_err(StageError::from_error)?;
+    call(
+        move || {
+            let distances = Distances::new(x.as_ref());
+            let positions = distances.positions(x.as_ref(), weight, &[]);
+            let positions = positions.map_err(StageError::from_error)?;
+            Ok((distances.mixed(weight), positions))
+        },
+        |(delta, positions)| {
+            let n = delta.count();
+            let data = (0..n).flat_map(|i| delta.row(i).iter().copied()).collect();
+            let shape = vec![n, n];
+            Bundle::from([
+                ("delta", Array::F64 { shape, data }),
+                ("P", Array::points(positions)),
+            ])
+        },
     )
 }
 
@@ -291,6 +332,7 @@ fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
         l: inputs.integer("l")?,
         m: inputs.integer("m")?,
         knots: rule(inputs)?,
+        layout: Layout::Mds,
         pins: Vec::new(),
     };
     let n = frames.ncols();
@@ -364,6 +406,7 @@ impl Choice {
             l: self.l,
             m: self.m,
             knots: self.knots,
+            layout: Layout::Mds,
             pins: Vec::new(),
         };
         fit(frames, &options).map_err(StageError::from_error)
@@ -389,6 +432,7 @@ impl<'a> Chain<'a> {
         Ok(match stage {
             "signal.mds" => Bundle::from([x(), ("start", Array::points(&self.start))]),
             "signal.mds_fixed" => self.pinned(),
+            "signal.layout" => Bundle::from([x(), ("weight", Array::vector(&[LAYOUT_WEIGHT]))]),
             "signal.rbf" => Bundle::from([
                 x(),
                 p(),
@@ -456,6 +500,9 @@ impl<'a> Chain<'a> {
         self.times.iter().map(|&t| time.evaluate(t)).collect()
     }
 }
+
+/// A weight at which both kinds of distances matter.
+const LAYOUT_WEIGHT: f64 = 0.5;
 
 /// Frame times and times between them: 1, 1.3, 2, 2.3, ...; at most 64 pairs, spread evenly.
 fn between_frames(n: usize) -> Vec<f64> {
