@@ -44,6 +44,7 @@ fn examples_on_embedded_sequences_run_as_written() {
         vec!["list"],
         vec!["signal", "fit"],
         vec!["signal", "sample"],
+        vec!["signal", "leave-out"],
     ] {
         let example = example(&verb).unwrap_or_else(|| panic!("{verb:?} has no example"));
         // `sample` reads what the example of `fit` wrote.

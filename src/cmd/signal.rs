@@ -80,9 +80,9 @@ pub struct FitVerb {
     /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
     #[arg(long, default_value = "symmetric", value_name = "RULE")]
     knots: String,
-    /// Layout of the pose plane: mds (the paper's, by distances between poses), ordered (mixed with distances along the motion, which needs no
-    /// pins), or ordered:W with a weight W from 0 to 1
-    #[arg(long, default_value = "mds", value_name = "LAYOUT")]
+    /// Layout of the pose plane: ordered (by distances between poses mixed with distances along the motion, which needs no pins), ordered:W with
+    /// a weight W from 0 to 1 for the latter, or mds (the paper's, by distances between poses)
+    #[arg(long, default_value = "ordered", value_name = "LAYOUT")]
     layout: String,
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]

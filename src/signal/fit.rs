@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::Point;
+use super::cubic::{CubicSpline, Ends};
 use super::f::{Spline, SplineError};
 use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
 use super::layout::{Distances, Layout, LayoutError};
-use super::natural::NaturalSpline;
 use super::parameters::{centripetal, distinct};
 use super::pins::{Pin, PinError, validate_pins};
 use super::poses::{diameter, first_of_each};
@@ -285,7 +285,7 @@ impl Base {
         if self.planes.len() == 1 {
             return Ok(best);
         }
-        let witness = NaturalSpline::new(self.shape.coordinates.as_ref()).midpoints();
+        let witness = CubicSpline::new(self.shape.coordinates.as_ref(), Ends::Natural).midpoints();
         let score = |base: &Self, attempt: &Attempt| {
             let between = base.between(attempt) - &witness;
             attempt.errors.psi + between.squared_norm_l2()

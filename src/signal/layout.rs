@@ -32,10 +32,9 @@ const HELD: f64 = 1e-9;
 const FLAT: f64 = 1e-12;
 
 /// Which dissimilarities are scaled.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Layout {
     /// The paper's: distances between poses (section 3.2.1).
-    #[default]
     Mds,
     /// Distances between poses mixed with distances along the motion, the latter with this weight, 0 to 1 (0 is `Mds`); the best of [`WEIGHTS`] if not
     /// given, see [`super::fit::fit`].

@@ -13,13 +13,14 @@
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
 //! | 6 a layout that needs no pins | [`layout`] |
-//! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`natural`] |
+//! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`cubic`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
 //! text is off, `docs/READINGS.md` says how it is read; "reading r" below is its number r.
 
 mod basis;
+pub mod cubic;
 pub mod f;
 pub mod fidelity;
 pub mod file;
@@ -31,7 +32,6 @@ pub mod knots;
 pub mod layout;
 pub mod leave_out;
 pub mod mds;
-pub mod natural;
 pub mod parameters;
 pub mod pins;
 pub mod poses;

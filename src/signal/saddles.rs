@@ -4,9 +4,9 @@
 //! Two signs are taken, half way between every two frames: how far g(f(t)) is from the natural cubic spline through the shape coordinates, in steps of
 //! the motion, which is the damage itself; and the Gaussian curvature of the surface g, which is negative at saddles.
 
+use super::cubic::{CubicSpline, Ends};
 use super::fit::Fit;
 use super::g::PoseSignal;
-use super::natural::NaturalSpline;
 use super::{Point, distance};
 use crate::linalg::kernels::{axpy, dot};
 
@@ -23,8 +23,8 @@ pub struct Place {
     pub time: f64,
     /// f(time).
     pub point: Point,
-    /// Distance in shape coordinates of g(f(time)) from the cubic spline, over the mean length of the steps from i - 1 to i + 2; 0 where the motion
-    /// stands still there and so does g.
+    /// Distance in shape coordinates of g(f(time)) from the cubic spline, less the greater of the errors of g(f(i)) and g(f(i + 1)), over the mean
+    /// length of the steps from i - 1 to i + 2. What a fit of few sites smooths away at the frames does not count; 0 is the least.
     pub stray: f64,
     /// Gaussian curvature of the surface g at f(time), times the square of that mean length, which leaves no unit: how much a patch the size of a
     /// step turns. None where g has no tangent plane, as on a collinear layout.
@@ -53,22 +53,32 @@ pub fn places(fit: &Fit) -> Vec<Place> {
         .map(|w| super::mds::separation(w[0], w[1]))
         .collect();
     let longest = steps.iter().copied().fold(0.0, f64::max);
-    let witness = NaturalSpline::new(x).midpoints();
-    let mut between = vec![0.0; m];
+    let witness = CubicSpline::new(x, Ends::Natural).midpoints();
+    let mut value = vec![0.0; m];
+    // Distance of g(f(time)) from this point.
+    let mut away = |time: f64, from: &[f64]| {
+        let point = fit.representation.time.evaluate(time);
+        fit.representation.pose.evaluate_into(point, &mut value);
+        super::mds::separation(&value, from)
+    };
+    let errors: Vec<f64> = (0..n).map(|i| away((i + 1) as f64, frames[i])).collect();
     (0..steps.len())
         .map(|i| {
             let time = i as f64 + 1.5;
             let point = fit.representation.time.evaluate(time);
-            fit.representation.pose.evaluate_into(point, &mut between);
             let beside = &steps[i.saturating_sub(1)..(i + 2).min(steps.len())];
             let step = beside.iter().sum::<f64>() / beside.len() as f64;
-            let away = super::mds::separation(&between, witness.col_as_slice(i));
+            let beyond = away(time, witness.col_as_slice(i)) - errors[i].max(errors[i + 1]);
             // A motion that stands still is measured by its longest step's rounding.
             let scale = step.max(1e-9 * longest);
             Place {
                 time,
                 point,
-                stray: if scale > 0.0 { away / scale } else { 0.0 },
+                stray: if scale > 0.0 {
+                    beyond.max(0.0) / scale
+                } else {
+                    0.0
+                },
                 curvature: gaussian_curvature(&fit.representation.pose, point)
                     .map(|k| k * step * step),
             }
