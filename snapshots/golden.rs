@@ -89,7 +89,18 @@ fn every_third(n: usize) -> Vec<f64> {
 
 #[test]
 fn embedded_sequences() {
-    for name in ["@gallop-small", "@roll-small", "@bar-small"] {
+    for name in [
+        "@gallop-small",
+        "@roll-small",
+        "@bar-small",
+        "@book-small",
+        "@klein-small",
+        "@character-small",
+        "@trot-small",
+        "@trot-poses-small",
+        "@face-small",
+        "@loop-small",
+    ] {
         let sequence = open(name).unwrap();
         let n = sequence.frame_count();
         let mut digest = Digest::default();

@@ -38,6 +38,14 @@ impl Array {
         }
     }
 
+    /// A list of whole numbers.
+    pub fn integers(data: &[i64]) -> Self {
+        Self::I64 {
+            shape: vec![data.len()],
+            data: data.to_vec(),
+        }
+    }
+
     /// A list of 0-based indices.
     pub fn indices(indices: &[usize]) -> Self {
         Self::I64 {
@@ -175,6 +183,11 @@ impl Bundle {
     pub fn integer(&self, name: &str) -> Result<usize, ArrayError> {
         usize::try_from(self.i64(name, 0)?[0])
             .map_err(|_| self.wrong(name, "a number of at least 0"))
+    }
+
+    /// A list of whole numbers.
+    pub fn integers(&self, name: &str) -> Result<&[i64], ArrayError> {
+        self.i64(name, 1)
     }
 
     /// A list of 0-based indices.

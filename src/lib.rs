@@ -11,12 +11,14 @@
 //! | [`shape`] | shape spaces: frames as vectors of numbers other than positions, and back |
 //! | [`signal`] | Cashman & Hormann 2012: time, pose and shape signals |
 //! | [`stages`] | the algorithms as named stages over typed arrays |
+//! | [`exhibits`] | tables, charts and pictures that show what the algorithms do |
 //! | [`harness`] | cases, engines, checks, verdicts, timing, records |
 //! | [`report`] | plots and the HTML report |
 //! | [`cmd`] | the command line, one file a verb |
 
 pub mod arrays;
 pub mod cmd;
+pub mod exhibits;
 pub mod harness;
 pub mod linalg;
 pub mod mesh;

@@ -52,6 +52,7 @@ fn fits_do_not_depend_on_threads() {
         "@jelly-small --k 20 --l 15 --m 9 --knots symmetric",
         "@jelly-small --tolerance 0.01",
         "@gallop-small --frames 1..20 --every 2 --k 12 --l 10 --m 9",
+        "@jelly-small --k 20 --l 15 --m 9 --space patch",
     ] {
         same_bytes("rep.npz", |out| {
             words(&format!("signal fit {choice} -o {out}"))
@@ -86,7 +87,7 @@ fn conversions_and_samples_do_not_depend_on_threads() {
     for name in ["a.npz", "a.pc2", "frames"] {
         same_bytes(name, |out| words(&format!("convert @jelly-small {out}")));
         same_bytes(name, |out| {
-            words(&format!("signal sample {rep} --count 61 -o {out}"))
+            words(&format!("signal sample {rep} --frames 61 -o {out}"))
         });
     }
     same_bytes("info.json", |out| {
@@ -164,6 +165,7 @@ fn representations_load_back_bit_for_bit() {
             connectivity: gallop.connectivity().clone(),
             space: SpaceKind::Vertex,
             reference: Vec::new(),
+            patches: Vec::new(),
         };
         let (bytes, loaded) = saved(&stored, &scratch.at("a.npz"));
         assert_eq!(all_bits(&stored), all_bits(&loaded));

@@ -26,37 +26,59 @@ fn the_table_of_engines_is_current() {
     );
 }
 
-/// The example that `--help` of each verb ends with.
-fn example(verb: &[&str]) -> Option<String> {
-    let mut arguments = verb.to_vec();
-    arguments.push("--help");
-    let help = meshseq(&arguments);
-    help.split_once("Example: meshseq ")
-        .map(|(_, rest)| rest.to_owned())
+/// The commands that `--help` of a verb ends with, as a script for a shell: a line after `Example:`, or indented lines below `Example:`.
+fn examples(verb: &[&str]) -> String {
+    let help = meshseq(&[verb, &["--help"]].concat());
+    let (_, rest) = help
+        .split_once("\nExample")
+        .unwrap_or_else(|| panic!("{verb:?} has no example"));
+    let (first, below) = rest.split_once('\n').unwrap_or((rest, ""));
+    let inline = first.trim_start_matches('s').trim_start_matches(':').trim();
+    let block = below.lines().take_while(|line| !line.trim().is_empty());
+    if inline.is_empty() {
+        return block.map(|line| format!("{line}\n")).collect();
+    }
+    // One command, which may be broken over lines where the terminal ends.
+    block.fold(inline.to_owned(), |all, line| format!("{all} {line}"))
+}
+
+/// The verbs below `signal`.
+fn signal_verbs() -> Vec<String> {
+    let help = meshseq(&["signal", "--help"]);
+    let (_, commands) = help.split_once("Commands:\n").unwrap();
+    let lines = commands.lines().take_while(|line| !line.is_empty());
+    let names = lines.filter_map(|line| line.split_whitespace().next());
+    let verbs = names.filter(|name| name.chars().all(char::is_lowercase) && *name != "help");
+    verbs.map(str::to_owned).collect()
 }
 
 #[test]
 fn examples_on_embedded_sequences_run_as_written() {
     let folder = tempfile::tempdir().unwrap();
-    for verb in [
-        vec!["info"],
-        vec!["convert"],
-        vec!["list"],
-        vec!["signal", "fit"],
-        vec!["signal", "sample"],
-        vec!["signal", "leave-out"],
-    ] {
-        let example = example(&verb).unwrap_or_else(|| panic!("{verb:?} has no example"));
-        // `sample` reads what the example of `fit` wrote.
-        let output = Command::new(env!("CARGO_BIN_EXE_meshseq"))
-            .args(example.split_whitespace())
-            .current_dir(folder.path())
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_meshseq"));
+    let mut path = std::ffi::OsString::from(program.parent().unwrap());
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    let signal = signal_verbs();
+    assert!(signal.len() >= 5, "{signal:?}");
+    let plain = ["info", "convert", "list"].map(|verb| vec![verb]);
+    let signal = signal.iter().map(|verb| vec!["signal", verb.as_str()]);
+    for verb in plain.into_iter().chain(signal) {
+        let script = examples(&verb);
+        assert!(script.contains("meshseq "), "{verb:?}: {script}");
+        // Each in a folder of its own, so that none needs what another has left there.
+        let own = folder.path().join(verb.join("-"));
+        std::fs::create_dir(&own).unwrap();
+        let output = Command::new("sh")
+            .args(["-e", "-c", &script])
+            .current_dir(own)
+            .env("PATH", &path)
             .env("MESHSEQ_HOME", env!("CARGO_MANIFEST_DIR"))
             .output()
             .unwrap();
         assert!(
             output.status.success(),
-            "{example}: {}",
+            "{script}: {}",
             String::from_utf8_lossy(&output.stderr)
         );
     }

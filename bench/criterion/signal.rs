@@ -14,7 +14,9 @@ use meshseq::signal::knots::{KnotRule, knots};
 use meshseq::signal::layout::Layout;
 use meshseq::signal::mds::{Dissimilarities, scale};
 use meshseq::signal::parameters::centripetal;
-use meshseq::signal::pins::principal_start;
+use meshseq::signal::pins::{Pin, principal_start};
+use meshseq::signal::refine::{RefineOptions, refine};
+use meshseq::signal::repin::Scaling;
 use meshseq::signal::sites::site_order;
 use rayon::prelude::*;
 
@@ -62,6 +64,35 @@ fn mds(c: &mut Criterion) {
         let start = principal_start(x.as_ref(), &[]);
         group.bench_function(BenchmarkId::new("frames", n), |b| {
             b.iter(|| scale(&Dissimilarities::new(x.as_ref()), &start, &[]));
+        });
+    }
+}
+
+/// One pin is dragged back and forth by 2% of the layout, and the layout follows from where it was.
+fn repin(c: &mut Criterion) {
+    let mut group = c.benchmark_group("repin");
+    for n in [24, 100, 204, 500, 1000] {
+        let (x, positions) = poses(n, 20.min(n - 1));
+        let pins = [0, n / 3, 2 * n / 3].map(|frame| Pin {
+            frame,
+            position: positions[frame],
+        });
+        let mut scaling =
+            Scaling::new(Dissimilarities::new(x.as_ref()), &positions, &pins).unwrap();
+        scaling.solve();
+        let reach = positions
+            .iter()
+            .flatten()
+            .fold(0.0f64, |r, x| r.max(x.abs()));
+        let mut side = 0.02 * reach;
+        group.bench_function(BenchmarkId::new("a pin moves, frames", n), |b| {
+            b.iter(|| {
+                let mut pin = pins[1];
+                pin.position[0] += side;
+                side = -side;
+                scaling.move_pin(pin).unwrap();
+                scaling.solve()
+            });
         });
     }
 }
@@ -114,14 +145,7 @@ fn psi(c: &mut Criterion) {
     let mut group = c.benchmark_group("psi");
     for vertices in [2_904, 10_000, 50_000, 200_000] {
         let z = frames(3 * vertices, 48);
-        let options = FitOptions {
-            k: 40,
-            l: 30,
-            m: 42,
-            knots: KnotRule::Symmetric,
-            layout: Layout::Mds,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(40, 30, 42);
         let r = fit(z.as_ref(), &options).unwrap().representation;
         let mut frame = vec![0.0; r.dimension()];
         group.bench_function(BenchmarkId::new("psi(t), vertices", vertices), |b| {
@@ -156,16 +180,28 @@ fn whole(c: &mut Criterion) {
     for n in [24, 204, 1000] {
         let z = frames(3000, n);
         let z: MatRef<'_, f64> = z.as_ref();
-        let options = FitOptions {
-            k: n * 3 / 4,
-            l: n * 7 / 10,
-            m: 40.min(n / 3),
-            knots: KnotRule::Symmetric,
-            layout: Layout::Mds,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3));
         group.bench_function(BenchmarkId::new("frames, V = 1000", n), |b| {
             b.iter(|| fit(z, &options).unwrap());
+        });
+    }
+}
+
+/// Steps of a refinement: in n with V fixed, and in V with n fixed, which must not matter beyond the shape signal.
+fn refinement(c: &mut Criterion) {
+    let mut group = c.benchmark_group("refine");
+    let five = RefineOptions {
+        iterations: 5,
+        tolerance: 0.0,
+        ..RefineOptions::default()
+    };
+    for (n, vertices) in [(24, 1000), (100, 1000), (204, 1000), (204, 10_000)] {
+        let z = frames(3 * vertices, n);
+        let options = FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3));
+        let staged = fit(z.as_ref(), &options).unwrap();
+        let name = format!("five steps, V = {vertices}, frames");
+        group.bench_function(BenchmarkId::new(name, n), |b| {
+            b.iter(|| refine(z.as_ref(), staged.clone(), &five).unwrap());
         });
     }
 }
@@ -180,6 +216,6 @@ fn quick() -> Criterion {
 criterion_group! {
     name = benches;
     config = quick();
-    targets = h, mds, sites_and_rbf, f, psi, whole
+    targets = h, mds, repin, sites_and_rbf, f, psi, whole, refinement
 }
 criterion_main!(benches);

@@ -16,6 +16,10 @@ import numpy as np
 
 FOLDER = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parent / "python"))
+import checking  # noqa: E402
+import test_halfway  # noqa: E402
+import test_poisson  # noqa: E402
+import test_shapes  # noqa: E402
 from wire import read_message, write_message  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else FOLDER.parents[1] / "target/oracles/cpp")
@@ -86,6 +90,41 @@ def check_distance(oracle):
     refused(oracle.run("sequence.distance", A=square[None] * np.nan, B=square[None], F=faces), "error")
 
 
+def settle():
+    """What the checks shared with the Python oracles have found so far, and no more than once."""
+    found, checking.failures[:] = list(checking.failures), []
+    assert not found, found
+
+
+def check_lengths(oracle):
+    """The closed forms of python/test_shapes.py, which asks the Python oracles the same."""
+
+    def encode(x0, F, frames):
+        reply = oracle.run("shape.lengths_encode", reference=x0, F=F, frames=frames)
+        return None if reply["status"] == "unsupported" else reply["out.z"]
+
+    test_shapes.check_lengths_encode("openmesh", encode, np.random.default_rng(1), books=False, turned_over=False, near=3e-8)
+    settle()
+    flat, F = test_shapes.strip(2)
+    flaps = oracle.run("shape.lengths_encode", reference=flat, F=np.concatenate([F, test_shapes.NEEDLE]), frames=flat[None])
+    np.testing.assert_allclose(flaps["out.z"][0, 1:20:2], np.zeros(10), atol=3e-8)
+    refused(oracle.run("shape.lengths_encode", reference=flat, F=F, frames=flat[None] * [1, 0, 1]))  # a collapsed triangle
+    refused(oracle.run("shape.lengths_encode", reference=flat, F=np.array([[0, 1, 1]]), frames=flat[None]))
+    refused(oracle.run("shape.lengths_encode", reference=flat, F=F + 9, frames=flat[None]), "error")
+
+
+def check_poisson(oracle):
+    """The closed forms of python/test_poisson.py, which asks the Python oracle the same."""
+    test_poisson.check_poisson("c++", oracle.run, np.random.default_rng(1))
+    settle()
+
+
+def check_halfway(oracle):
+    """The closed forms of python/test_halfway.py, which asks the Python oracle the same."""
+    test_halfway.check_halfway("cgal", lambda **inputs: oracle.run("shape.halfway", **inputs), books=False)
+    settle()
+
+
 def check_rho(oracle):
     query = np.linspace(1, 6, 31)
     near(oracle.run("signal.rho", t=2 * np.arange(6.0), query=query), values=2 * (query - 1), slopes=np.full(6, 2.0))
@@ -146,6 +185,10 @@ def check_manners(command, stage):
 PROGRAMS = [
     ([str(BUILD / "sequence_read_openmesh")], "sequence.read", check_read),
     ([str(BUILD / "sequence_distance_cgal")], "sequence.distance", check_distance),
+    ([str(BUILD / "shape_lengths_openmesh")], "shape.lengths_encode", check_lengths),
+    ([str(BUILD / "shape_halfway_cgal")], "shape.halfway", check_halfway),
+    ([str(BUILD / "shape_poisson_cholmod")], "shape.poisson_factor", check_poisson),
+    ([str(BUILD / "shape_poisson_eigen")], "shape.poisson_factor", check_poisson),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_rho_r.R")], "signal.rho", check_rho),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_spline_r.R")], "signal.spline", check_spline),
     ([RSCRIPT, "--vanilla", str(FOLDER.parent / "r" / "signal_h_r.R")], "signal.h", check_h),

@@ -23,7 +23,7 @@ impl Data {
         for entry in catalogue() {
             let size = format!("n={} V={} F={}", entry.frames, entry.vertices, entry.faces);
             say(&format!(
-                "  {:<14} {size:<24} {}",
+                "  {:<20} {size:<24} {}",
                 entry.name, entry.summary
             ));
         }

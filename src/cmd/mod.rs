@@ -5,7 +5,6 @@ mod convert;
 mod data;
 mod doctor;
 mod info;
-mod leave_out;
 mod list;
 mod output;
 mod report;

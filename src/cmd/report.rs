@@ -26,6 +26,10 @@ pub fn page(record: &Record) -> Result<String, Failure> {
 impl Report {
     pub fn run(self) -> Outcome {
         let record = Record::read(&self.record)?;
+        let table = report::table_1_text(&record, &PublishedRow::table_1()?);
+        if !table.is_empty() {
+            say(&table);
+        }
         let path = self.record.join("report.html");
         write_whole(&path, &page(&record)?)?;
         say(&format!(

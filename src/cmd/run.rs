@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::output::{progress, say};
 use super::{Failure, Outcome, home};
+use crate::exhibits::{self, Exhibit, Panel};
 use crate::harness::case::{Case, read_all, select};
 use crate::harness::inject::{self, FAULTS};
 use crate::harness::record::{Record, Verdict};
@@ -43,6 +44,9 @@ pub struct Verify {
     /// Time the engines that agree, on the cases marked for it
     #[arg(long)]
     time: bool,
+    /// Make the exhibits too: tables, charts and pictures of poses that show what the algorithms do
+    #[arg(long)]
+    exhibits: bool,
     /// Make a Rust stage wrong on purpose; exit code 1 says that it was caught. `list` names the faults
     #[arg(long, value_name = "FAULT")]
     inject: Option<String>,
@@ -72,7 +76,7 @@ impl Verify {
         } else {
             Timing::None
         };
-        let record = self.run.execute(&cases, fault, timing)?;
+        let record = self.run.execute(&cases, fault, timing, self.exhibits)?;
         let wrong = record.agreement.iter().filter(|row| {
             !matches!(
                 row.verdict,
@@ -93,7 +97,7 @@ impl Measure {
         if self.run.cases.is_empty() {
             cases.retain(|case| case.measure);
         }
-        let record = self.run.execute(&cases, None, Timing::All)?;
+        let record = self.run.execute(&cases, None, Timing::All, false)?;
         Ok(record
             .agreement
             .iter()
@@ -107,6 +111,7 @@ impl Run {
         cases: &[Case],
         fault: Option<&'static inject::Fault>,
         timing: Timing,
+        with_exhibits: bool,
     ) -> Result<Record, Failure> {
         let options = Options {
             home: home(),
@@ -127,11 +132,23 @@ impl Run {
             bar.inc(1);
         });
         bar.finish_and_clear();
+        if with_exhibits {
+            record.exhibits = self.exhibits();
+        }
         if self.record {
             // Pictures of real data are derived from geometry that may not be passed on; numbers may.
             record
                 .figures
                 .retain(|figure| figure.dataset.starts_with('@'));
+            record
+                .exhibits
+                .iter_mut()
+                .filter(|exhibit| exhibit.datasets.iter().any(|d| !d.starts_with('@')))
+                .for_each(|exhibit| {
+                    exhibit
+                        .panels
+                        .retain(|panel| !matches!(panel, Panel::Picture(_)))
+                });
         }
         record.machine = machine();
         record.command = command();
@@ -144,6 +161,22 @@ impl Run {
             std::path::absolute(&page)?.display()
         ));
         Ok(record)
+    }
+
+    /// Every exhibit whose data are there; what cannot be made is told.
+    fn exhibits(&self) -> Vec<Exhibit> {
+        let data = DataFolders::new(self.data.as_deref());
+        let make = |&(name, make): &(&str, exhibits::Make)| match make(&data) {
+            Ok(exhibit) => {
+                say(&format!("exhibit {name}: {}", exhibit.title));
+                Some(exhibit)
+            }
+            Err(error) => {
+                say(&format!("exhibit {name}: skipped: {error}"));
+                None
+            }
+        };
+        exhibits::ALL.iter().filter_map(make).collect()
     }
 
     /// The record's folder, made: as named, or the next free number of this day.
@@ -227,6 +260,7 @@ fn line(case: &Case, judged: &[Judged]) -> String {
     parts.join("  ")
 }
 
+/// What counts, by verdict, and the tables.
 fn summary(record: &Record) -> String {
     let mut counts = Vec::new();
     for verdict in [

@@ -1,32 +1,37 @@
-//! `signal fit` and `signal sample`; `signal leave-out` is in a file of its own.
+//! `signal fit`; the other verbs of signals are in files of their own.
 
-use std::io::Read;
+mod design;
+mod edit;
+mod leave_out;
+mod result;
+mod sample;
+mod tables;
+mod transfer;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use faer::MatRef;
 use serde_json::json;
 
-use super::leave_out::LeaveOutVerb;
+use self::tables::placed_frames;
 use super::output::{check_place, draft_json, say};
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
-use crate::sequence::format::write;
-use crate::shape::{SpaceKind, prepare};
+use crate::shape::{Space, SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
-use crate::signal::file::{Stored, load, save};
+use crate::signal::file::{Stored, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
-use crate::signal::in_space::{SpaceFit, fit_in_space, fit_in_space_to_rms};
+use crate::signal::in_space::{
+    SpaceFit, fit_in_space, fit_in_space_to_rms, fit_in_space_to_rms_refined, refine_in_space,
+};
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
 use crate::signal::pins::{Pin, validate_pins};
+use crate::signal::refine::tolerance::fit_to_error_refined;
+use crate::signal::refine::{self, RefineOptions, Refinement};
 use crate::signal::saddles::{Place, places};
-
-/// More frames are a mistake.
-const MOST_FRAMES: usize = 10_000_000;
-/// More pins than any plane of poses takes; a longer file is none of pins.
-const LONGEST_PINS: u64 = 64 << 20;
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -35,12 +40,21 @@ pub enum Signal {
         after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json"
     )]
     Fit(FitVerb),
-    /// Frames of a representation at any times
-    #[command(after_help = "Example: meshseq signal sample gallop.npz --count 48 -o twice-as-many")]
-    Sample(SampleVerb),
     /// Fit every second frame and predict the others
-    #[command(after_help = "Example: meshseq signal leave-out @gallop-small --json leave-out.json")]
-    LeaveOut(LeaveOutVerb),
+    #[command(after_help = leave_out::EXAMPLES)]
+    LeaveOut(leave_out::LeaveOutVerb),
+    /// Frames of a representation at any times: other rates, slow and fast motion
+    #[command(after_help = sample::EXAMPLES)]
+    Sample(sample::SampleVerb),
+    /// Change the time signal: move control points, add loops, delete, repeat or reverse frames
+    #[command(after_help = edit::EXAMPLES)]
+    Edit(edit::EditVerb),
+    /// Move a motion to another mesh by examples that pair the two
+    #[command(after_help = transfer::EXAMPLES)]
+    Transfer(transfer::TransferVerb),
+    /// A sequence from poses placed in the plane and a curve sketched among them
+    #[command(after_help = design::EXAMPLES)]
+    Design(design::DesignVerb),
 }
 
 impl Signal {
@@ -49,6 +63,9 @@ impl Signal {
             Self::Fit(verb) => verb.run(),
             Self::Sample(verb) => verb.run(),
             Self::LeaveOut(verb) => verb.run(),
+            Self::Edit(verb) => verb.run(),
+            Self::Transfer(verb) => verb.run(),
+            Self::Design(verb) => verb.run(),
         }
     }
 }
@@ -71,7 +88,7 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// Shape space: vertex, gradient or lric
+    /// Shape space: vertex, gradient, lric or patch
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given
@@ -82,11 +99,17 @@ pub struct FitVerb {
     knots: String,
     /// Layout of the pose plane: ordered (by distances between poses mixed with distances along the motion, which needs no pins), ordered:W with
     /// a weight W from 0 to 1 for the latter, or mds (the paper's, by distances between poses)
-    #[arg(long, default_value = "ordered", value_name = "LAYOUT")]
+    #[arg(long, default_value_t = Layout::default().to_string(), value_name = "LAYOUT")]
     layout: String,
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]
     pins: Option<PathBuf>,
+    /// Lower the error of the whole chain jointly, from where its stages end
+    #[arg(long)]
+    refine: bool,
+    /// With --refine: weight of the frames half-way between frames, beside 1 for a frame
+    #[arg(long, value_name = "W", default_value_t = RefineOptions::default().between, requires = "refine", allow_negative_numbers = true)]
+    between: f64,
     /// Write the representation to this .npz
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -103,31 +126,31 @@ impl FitVerb {
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
         let space: SpaceKind = self.space.parse()?;
         let layout: Layout = self.layout.parse()?;
-        if let Some(out) = self
-            .out
-            .as_ref()
-            .filter(|out| out.extension().is_none_or(|e| e != "npz"))
-        {
-            return Err(format!(
-                "{}: a representation is one .npz file; name it so",
-                out.display()
-            )
-            .into());
+        if let Some(out) = &self.out {
+            check_representation_place(out)?;
         }
-        for path in self.out.iter().chain(&self.json) {
-            check_place(path)?;
-        }
+        self.json.as_deref().map_or(Ok(()), check_place)?;
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
+        check_between(self.between)?;
         let sequence = self.frames.open(&self.sequence)?;
         let pins = match &self.pins {
             Some(path) => read_pins(path, sequence.frame_count())?,
             None => Vec::new(),
         };
         let reference = self.reference(&sequence, space)?;
-        let fitted = self.fit(&sequence, space, &reference, knots, layout, pins)?;
-        let numbers = numbers(&sequence, &fitted, space, knots, layout);
+        let (mesh, frames) = (sequence.connectivity(), sequence.positions());
+        let patches = patches_for(space, mesh, &reference, frames)?;
+        let prepared = match space {
+            SpaceKind::Vertex => None,
+            _ => Some(prepare(space, mesh.clone(), &reference, &patches)?),
+        };
+        let (fitted, refinement) = self.fit(&sequence, prepared.as_deref(), knots, layout, pins)?;
+        let mut numbers = numbers(&sequence, &fitted, space, knots, layout);
+        if let Some(told) = &refinement {
+            numbers["refine"] = refine_numbers(told);
+        }
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -138,6 +161,7 @@ impl FitVerb {
                 connectivity: sequence.connectivity().clone(),
                 space,
                 reference,
+                patches,
             };
             save(&stored, out)?;
         }
@@ -176,12 +200,15 @@ impl FitVerb {
     fn fit(
         &self,
         sequence: &Sequence,
-        space: SpaceKind,
-        reference: &[f64],
+        space: Option<&dyn Space>,
         knots: KnotRule,
         layout: Layout,
         pins: Vec<Pin>,
-    ) -> Result<SpaceFit, Failure> {
+    ) -> Result<(SpaceFit, Option<Refinement>), Failure> {
+        let refine = self.refine.then(|| RefineOptions {
+            between: self.between,
+            ..RefineOptions::default()
+        });
         let constants = match (self.k, self.l, self.m) {
             (Some(k), Some(l), Some(m)) => Some(FitOptions {
                 k,
@@ -194,30 +221,60 @@ impl FitVerb {
             _ => None,
         };
         let tolerance = self.tolerance.unwrap_or(f64::NAN);
-        if space == SpaceKind::Vertex {
+        let frames = sequence.positions();
+        let Some(space) = space else {
             let (d, n) = (sequence.dimension(), sequence.frame_count());
-            let frames = MatRef::from_column_major_slice(sequence.positions(), d, n);
-            let fit = match &constants {
-                Some(options) => fit(frames, options)?,
-                None => {
-                    let most = allowed_error(sequence, tolerance);
-                    fit_to_error(frames, most, knots, layout, &pins)?
+            let frames = MatRef::from_column_major_slice(frames, d, n);
+            let most = allowed_error(sequence, tolerance);
+            let (fit, told) = match (&constants, &refine) {
+                (Some(options), None) => (fit(frames, options)?, None),
+                (Some(options), Some(how)) => {
+                    some(refine::refine(frames, fit(frames, options)?, how)?)
                 }
+                (None, None) => (fit_to_error(frames, most, knots, layout, &pins)?, None),
+                (None, Some(how)) => some(fit_to_error_refined(
+                    frames, most, knots, layout, &pins, how,
+                )?),
             };
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
-            return Ok(SpaceFit { fit, rms });
-        }
-        let prepared = prepare(space, sequence.connectivity().clone(), reference)?;
-        let frames = sequence.positions();
-        Ok(match &constants {
-            Some(options) => fit_in_space(&*prepared, frames, options)?,
-            None => {
-                let size = bounds(sequence.frame(0)).diagonal();
-                let rms = (tolerance * size).max(f64::MIN_POSITIVE);
-                fit_in_space_to_rms(&*prepared, frames, rms, knots, layout, &pins)?
+            return Ok((SpaceFit { fit, rms }, told));
+        };
+        let size = bounds(sequence.frame(0)).diagonal();
+        let rms = (tolerance * size).max(f64::MIN_POSITIVE);
+        Ok(match (&constants, &refine) {
+            (Some(options), None) => (fit_in_space(space, frames, options)?, None),
+            (Some(options), Some(how)) => {
+                let staged = fit_in_space(space, frames, options)?;
+                some(refine_in_space(space, frames, staged, how)?)
             }
+            (None, None) => {
+                let fit = fit_in_space_to_rms(space, frames, rms, knots, layout, &pins)?;
+                (fit, None)
+            }
+            (None, Some(how)) => some(fit_in_space_to_rms_refined(
+                space, frames, rms, knots, layout, &pins, how,
+            )?),
         })
     }
+}
+
+/// An error unless frames between frames can have this weight.
+fn check_between(weight: f64) -> Result<(), Failure> {
+    match weight >= 0.0 && weight.is_finite() {
+        true => Ok(()),
+        false => Err(format!("--between {weight}: expected a weight of 0 or more").into()),
+    }
+}
+
+fn some<T, U>((fit, told): (T, U)) -> (T, Option<U>) {
+    (fit, Some(told))
+}
+
+fn refine_numbers(told: &Refinement) -> serde_json::Value {
+    json!({
+        "error_psi_before": told.before, "error_psi": told.after, "iterations": told.iterations,
+        "gradient": told.gradient, "between": told.between, "time_ms": told.elapsed.as_secs_f64() * 1e3,
+    })
 }
 
 /// The error (2) at which the relative RMS is `relative`.
@@ -260,6 +317,7 @@ fn numbers(
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
+        "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
         "astray": astray,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
@@ -289,12 +347,21 @@ fn spread(sequence: &Sequence) -> f64 {
 fn describe(name: &str, v: &serde_json::Value) -> String {
     let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
+    let refined = v.get("refine").map_or(String::new(), |r| {
+        let number = |key: &str| r[key].as_f64().unwrap_or(f64::NAN);
+        format!(
+            "\nrefined: (2) from {:.5} in {} steps and {:.0} ms",
+            number("error_psi_before"),
+            r["iterations"],
+            number("time_ms")
+        )
+    });
     format!(
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
-         {}
+         {}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
-         ms: h {:.3}, mds {:.3}, rbf {:.3}, g {:.3}, f {:.3}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],
@@ -314,6 +381,8 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         3 * v["n"].as_u64().unwrap_or(0) * v["V"].as_u64().unwrap_or(0),
         t("h"),
         t("mds"),
+        v["mds_steps"]["majorising"],
+        v["mds_steps"]["newton"],
         t("rbf"),
         t("g"),
         t("f"),
@@ -338,116 +407,16 @@ fn astray_line(places: &serde_json::Value) -> String {
 
 /// Rows `frame,x,y` below a header line, with frames of 1 to n.
 fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
-    let place = path.display();
-    let file = std::fs::File::open(path).map_err(|e| format!("{place}: cannot read pins: {e}"))?;
-    // One byte more than allowed tells a file that is too long; a device never ends.
-    let mut text = String::new();
-    file.take(LONGEST_PINS + 1)
-        .read_to_string(&mut text)
-        .map_err(|e| format!("{place}: cannot read pins: {e}"))?;
-    if text.len() as u64 > LONGEST_PINS {
-        return Err(
-            format!("{place}: more than {LONGEST_PINS} bytes, which pins never have").into(),
-        );
-    }
-    let pins = parse_pins(&text).map_err(|e| {
-        format!("{place}: {e}; expected a line `frame,x,y` and then one such row a pin, frames counted from 1")
-    })?;
-    validate_pins(&pins, n).map_err(|e| format!("{place}: {e}"))?;
+    let pins = placed_frames(path, "pins")?;
+    validate_pins(&pins, n).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(pins)
 }
 
-fn parse_pins(text: &str) -> Result<Vec<Pin>, Failure> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let header = reader.headers()?;
-    if header != ["frame", "x", "y"].as_slice() {
-        let found: Vec<String> = header.iter().map(shortened).collect();
-        return Err(format!("the first line is `{}`", found.join(",")).into());
+/// An error where a representation could not be written: it is one .npz file.
+fn check_representation_place(path: &Path) -> Result<(), Failure> {
+    if path.extension().is_none_or(|e| e != "npz") {
+        let place = path.display();
+        return Err(format!("{place}: a representation is one .npz file; name it so").into());
     }
-    let mut pins = Vec::new();
-    for row in reader.deserialize() {
-        let (frame, x, y): (usize, f64, f64) = row?;
-        let frame = frame.checked_sub(1).ok_or("a pin names frame 0")?;
-        pins.push(Pin {
-            frame,
-            position: [x, y],
-        });
-    }
-    Ok(pins)
-}
-
-/// The beginning of what may be very long.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
-}
-
-#[derive(Args)]
-pub struct SampleVerb {
-    /// A representation that `signal fit` wrote
-    representation: PathBuf,
-    /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
-    #[arg(long, value_name = "N", conflicts_with = "times", allow_negative_numbers = true, value_parser = whole("1 or more"))]
-    count: Option<usize>,
-    /// Frame times in [1, n], separated by commas
-    #[arg(
-        long,
-        value_name = "T,T,..",
-        value_delimiter = ',',
-        allow_negative_numbers = true
-    )]
-    times: Vec<f64>,
-    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
-    #[arg(short, long, value_name = "OUT")]
-    out: PathBuf,
-}
-
-impl SampleVerb {
-    pub fn run(self) -> Outcome {
-        let stored = load(&self.representation)?;
-        let n = stored.representation.time.frame_count() as f64;
-        let times = self.frame_times(n)?;
-        check_memory(times.len(), stored.representation.dimension())?;
-        let frames = stored.sample(&times);
-        let frames = frames.map_err(|e| format!("{}: {e}", self.representation.display()))?;
-        let sequence = Sequence::new(stored.connectivity, times.len(), frames)
-            .map_err(|e| format!("{}: sampled, {e}", self.representation.display()))?;
-        write(&sequence, &self.out)?;
-        say(&format!("{}: {} frames", self.out.display(), times.len()));
-        Ok(true)
-    }
-
-    fn frame_times(&self, n: f64) -> Result<Vec<f64>, Failure> {
-        if let Some(t) = self.times.iter().find(|t| !(1.0..=n).contains(*t)) {
-            return Err(format!("--times {t}: expected frame times from 1 to {n}").into());
-        }
-        if !self.times.is_empty() {
-            return Ok(self.times.clone());
-        }
-        let count = self.count.unwrap_or(n as usize);
-        if count == 0 || count > MOST_FRAMES {
-            return Err(format!("--count {count}: expected 1 to {MOST_FRAMES}").into());
-        }
-        let step = if count > 1 {
-            (n - 1.0) / (count - 1) as f64
-        } else {
-            0.0
-        };
-        Ok((0..count).map(|i| (1.0 + i as f64 * step).min(n)).collect())
-    }
-}
-
-/// An error where that many frames of d numbers do not fit into memory.
-fn check_memory(frames: usize, d: usize) -> Result<(), Failure> {
-    let numbers = frames.checked_mul(d);
-    let fits = numbers.is_some_and(|count| Vec::<f64>::new().try_reserve_exact(count).is_ok());
-    if fits {
-        return Ok(());
-    }
-    let gigabytes = frames as f64 * d as f64 * 8e-9;
-    Err(format!(
-        "{frames} frames of {d} numbers, {gigabytes:.0} GB, do not fit into memory; sample fewer at a time with --times"
-    )
-    .into())
+    Ok(check_place(path)?)
 }

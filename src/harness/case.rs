@@ -8,6 +8,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use super::tolerance::{self, Tolerance};
+use crate::shape::SpaceKind;
 use crate::signal::knots::KnotRule;
 use crate::stages::{self, Stage, signal::Choice};
 
@@ -98,6 +99,7 @@ struct Entry {
     l: Option<usize>,
     m: Option<usize>,
     knots: Option<String>,
+    space: Option<String>,
     #[serde(default)]
     pins: usize,
     #[serde(default)]
@@ -230,6 +232,7 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
             m: entry.m.unwrap_or(0),
             knots: knots(entry.knots.as_deref())?,
             pins: entry.pins,
+            space: space(entry.space.as_deref())?,
         },
         expect: expectations(&entry.expect)?,
         tolerances: tolerances(stage.name, entry.check)?,
@@ -244,6 +247,12 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
 fn knots(rule: Option<&str>) -> Result<KnotRule, String> {
     rule.map_or(Ok(KnotRule::default()), |rule| {
         rule.parse().map_err(|e| format!("{e}: `{rule}`"))
+    })
+}
+
+fn space(name: Option<&str>) -> Result<SpaceKind, String> {
+    name.map_or(Ok(SpaceKind::Vertex), |name| {
+        name.parse().map_err(|e| format!("{e}"))
     })
 }
 

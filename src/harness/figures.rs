@@ -1,10 +1,14 @@
 //! What the pictures of a fit are drawn from.
 
-use faer::MatRef;
+use faer::Mat;
 
 use super::case::Case;
 use super::record::FitFigures;
+use crate::mesh::measure::bounds;
+use crate::sequence::Sequence;
+use crate::shape::{Space, encode_all, prepare_for};
 use crate::signal::fit::Fit;
+use crate::signal::in_space::{mean_squares, rms_after_decoding};
 use crate::stages::StageError;
 use crate::stages::signal::Choice;
 
@@ -13,50 +17,83 @@ const PER_FRAME: usize = 12;
 /// Values tried of each of k, l and m.
 const STEPS: usize = 10;
 
-/// Fits the case's constants, and neighbours of each of them, to the frames (d x n).
-pub fn draw(case: &Case, frames: MatRef<'_, f64>) -> Result<FitFigures, StageError> {
-    let fit = case.choice.fit(frames)?;
-    let n = frames.ncols();
+/// Fits the case's constants, and neighbours of each of them, to a sequence whose first frame is the space's reference.
+pub fn draw(case: &Case, sequence: &Sequence) -> Result<FitFigures, StageError> {
+    let frames = Frames::new(case, sequence)?;
+    let fit = case.choice.fit(frames.z.as_ref())?;
     let (k, l, m) = fit.klm();
+    let n = sequence.frame_count();
     let time = &fit.representation.time;
     let dense = (0..=(n - 1) * PER_FRAME).map(|i| 1.0 + i as f64 / PER_FRAME as f64);
-    let size = diagonal(frames);
-    let relative = |psi: f64| (psi / (n * frames.nrows() / 3) as f64).sqrt() / size;
-    let sweep = |low: usize, high: usize, with: &dyn Fn(usize) -> Choice| {
-        let values = steps(low, high);
-        let error = |v: usize| Ok((v, relative(with(v).fit(frames)?.errors.psi)));
-        values
-            .into_iter()
-            .map(error)
-            .collect::<Result<Vec<_>, StageError>>()
-    };
     let base = &case.choice;
     Ok(FitFigures {
         case: case.name.clone(),
         dataset: case.dataset.clone(),
+        space: base.space.to_string(),
         k,
         l,
         m,
-        d: frames.nrows(),
+        d: frames.z.nrows(),
         frames: n,
         positions: fit.positions.clone(),
         frame_points: (1..=n).map(|i| time.evaluate(i as f64)).collect(),
         curve: dense.map(|t| time.evaluate(t)).collect(),
         control: time.spline.control.clone(),
         sites: fit.sites.order.clone(),
-        frame_errors: frame_errors(&fit, frames, size),
+        frame_errors: frames.errors(&fit)?,
         singular_values: fit.singular_values.clone(),
-        error_by_m: sweep(0, n - 1, &|m| Choice { m, ..base.clone() })?,
-        error_by_l: sweep(3, n, &|l| Choice { l, ..base.clone() })?,
-        error_by_k: sweep(4, n + 2, &|k| Choice { k, ..base.clone() })?,
+        error_by_m: frames.sweep(0, n - 1, |m| Choice { m, ..base.clone() })?,
+        error_by_l: frames.sweep(3, n, |l| Choice { l, ..base.clone() })?,
+        error_by_k: frames.sweep(4, n + 2, |k| Choice { k, ..base.clone() })?,
         errors: [fit.errors.h, fit.errors.g, fit.errors.f, fit.errors.psi],
-        milliseconds: milliseconds(&fit),
     })
 }
 
-fn milliseconds(fit: &Fit) -> [f64; 5] {
-    let t = fit.timings;
-    [t.h, t.mds, t.rbf, t.g, t.f].map(|d| d.as_secs_f64() * 1e3)
+/// The frames, as positions and in the space.
+struct Frames<'a> {
+    sequence: &'a Sequence,
+    space: Box<dyn Space>,
+    z: Mat<f64>,
+    diagonal: f64,
+}
+
+impl<'a> Frames<'a> {
+    fn new(case: &Case, sequence: &'a Sequence) -> Result<Self, StageError> {
+        let (mesh, positions) = (sequence.connectivity(), sequence.positions());
+        let space = prepare_for(case.choice.space, mesh, positions);
+        let space = space.map_err(StageError::from_error)?;
+        let z = encode_all(&*space, positions).map_err(StageError::from_error)?;
+        Ok(Self {
+            sequence,
+            space,
+            z,
+            diagonal: bounds(sequence.frame(0)).diagonal(),
+        })
+    }
+
+    /// Relative RMS vertex distance of each frame.
+    fn errors(&self, fit: &Fit) -> Result<Vec<f64>, StageError> {
+        let positions = self.sequence.positions();
+        let squares = mean_squares(&*self.space, positions, &fit.representation);
+        let squares = squares.map_err(StageError::from_error)?;
+        Ok(squares.iter().map(|s| s.sqrt() / self.diagonal).collect())
+    }
+
+    /// Relative RMS vertex distance of all frames for values between low and high of one constant.
+    fn sweep(
+        &self,
+        low: usize,
+        high: usize,
+        with: impl Fn(usize) -> Choice,
+    ) -> Result<Vec<(usize, f64)>, StageError> {
+        let error = |value: usize| {
+            let fit = with(value).fit(self.z.as_ref())?;
+            let positions = self.sequence.positions();
+            let rms = rms_after_decoding(&*self.space, positions, &fit.representation);
+            Ok((value, rms.map_err(StageError::from_error)? / self.diagonal))
+        };
+        steps(low, high).into_iter().map(error).collect()
+    }
 }
 
 /// Distinct values from low to high, both in.
@@ -66,21 +103,4 @@ fn steps(low: usize, high: usize) -> Vec<usize> {
         .collect();
     values.dedup();
     values
-}
-
-fn diagonal(frames: MatRef<'_, f64>) -> f64 {
-    let first: Vec<f64> = frames.col(0).iter().copied().collect();
-    crate::mesh::measure::bounds(&first).diagonal()
-}
-
-fn frame_errors(fit: &Fit, frames: MatRef<'_, f64>, size: f64) -> Vec<f64> {
-    let d = frames.nrows();
-    let mut frame = vec![0.0; d];
-    (0..frames.ncols())
-        .map(|i| {
-            fit.representation.evaluate_into((i + 1) as f64, &mut frame);
-            let square: f64 = (0..d).map(|a| (frame[a] - frames[(a, i)]).powi(2)).sum();
-            (square / (d / 3) as f64).sqrt() / size
-        })
-        .collect()
 }

@@ -73,6 +73,36 @@ faults! {
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
+    "poisson-entry" in "shape.poisson_factor": "the last entry of the matrix twice",
+        Inputs(|inputs| numbers(inputs, "values", |v| { let at = v.len() - 1; v[at] *= 2.0 }));
+    "poisson-relative" in "shape.poisson_solve": "solutions a millionth too large",
+        Outputs(|_, out| numbers(out, "x", stretch));
+    "halfway-straight" in "shape.halfway": "the mean of positions",
+        Outputs(|inputs, out| {
+            let end = inputs.f64("end", 2).map(|(_, end)| end.to_vec()).unwrap_or_default();
+            copy(inputs, "start", out, "frame");
+            numbers(out, "frame", |x| x.iter_mut().zip(end).for_each(|(x, end)| *x = 0.5 * (*x + end)));
+        });
+    "patch-relative" in "shape.patch_encode": "stretches a millionth too large",
+        Outputs(|inputs, out| each_triangle(inputs, out, |numbers| stretch(&mut numbers[3..])));
+    "patch-backwards" in "shape.patch_encode": "rotations of adjacent patches the other way round",
+        Outputs(|inputs, out| each_pair(inputs, out, "z", |z| z.iter_mut().for_each(|x| *x = -*x)));
+    "patch-boundary" in "shape.patch_encode": "a triangle counted to the patch beside it",
+        Inputs(|inputs| {
+            let labels = inputs.integers("patches").unwrap_or_default().to_vec();
+            let faces = inputs.triangles("F").unwrap_or_default();
+            let pair = crate::mesh::topology::Topology::new(&faces).pairs().map(|p| [p.first, p.second].map(|h| h.triangle as usize))
+                .find(|&[f, g]| labels[f] != labels[g]);
+            if let Some([f, g]) = pair { integers(inputs, "patches", |p| p[f] = p[g]); }
+        });
+    "patch-turn-dropped" in "shape.patch_encode": "components without their rotation",
+        Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
+    "patch-bent" in "shape.patch_decode": "adjacent patches turned a millionth more against each other",
+        Inputs(|inputs| { let given = inputs.clone(); each_pair(&given, inputs, "z", stretch) });
+    "patch-wrong-frame" in "shape.patch_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "patch-frames" in "shape.patch_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
     "h-sign" in "signal.h": "first direction and its coordinates negated",
         Outputs(|inputs, out| {
             let d = row_length(inputs, "Z");
@@ -186,6 +216,27 @@ faults! {
             let m = row_length(inputs, "g");
             numbers(inputs, "g", |g| { let at = g.len() - 2 * m; g[at..].fill(0.0) });
         });
+    "insert-unblended" in "signal.insert_knots": "a control point of the old curve in place of a blended one",
+        Outputs(|inputs, out| {
+            let old = inputs.points("control").map(|c| c[1]).unwrap_or_default();
+            numbers(out, "control", |c| c[2..4].copy_from_slice(&old));
+        });
+    "insert-dropped" in "signal.insert_knots": "the last new knot left out",
+        Inputs(|inputs| shorten(inputs, "insert", 1));
+    "insert-curve" in "signal.insert_knots": "control points of the curve moved a millionth",
+        Inputs(|inputs| numbers(inputs, "control", stretch));
+    "insert-off-by-one" in "signal.insert_knots": "the first two control points swapped",
+        Outputs(|_, out| numbers(out, "control", |c| swap_rows(c, 2, 0, 1)));
+    "transfer-relative" in "signal.transfer": "coordinates a millionth too long",
+        Outputs(|_, out| numbers(out, "X", stretch));
+    "transfer-wrong-example" in "signal.transfer": "the second and third example of the target swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "R"); numbers(inputs, "R", |r| swap_rows(r, d, 1, 2)) });
+    "transfer-other-reference" in "signal.transfer": "the second example in place of the reference pose",
+        Inputs(|inputs| { let d = row_length(inputs, "Q"); numbers(inputs, "Q", |q| q.copy_within(d..2 * d, 0)) });
+    "transfer-example-dropped" in "signal.transfer": "the last example left out",
+        Inputs(|inputs| { let (d, e) = (row_length(inputs, "Q"), row_length(inputs, "R")); shorten(inputs, "Q", d); shorten(inputs, "R", e) });
+    "transfer-frames" in "signal.transfer": "frames a millionth too large",
+        Outputs(|_, out| numbers(out, "W", stretch));
     "signal-other-knots" in "signal": "the other averaging rule",
         Inputs(other_rule);
     "signal-site-dropped" in "signal": "one site fewer",
@@ -215,6 +266,16 @@ fn each_triangle(inputs: &Bundle, out: &mut Bundle, change: impl Fn(&mut [f64]))
     numbers(out, "z", |z| {
         let rows = z.chunks_mut(d);
         rows.for_each(|row| row[..9 * triangles].chunks_mut(9).for_each(&change));
+    });
+}
+
+/// The rotation vectors of adjacent patches in every row of a one-component encoding.
+fn each_pair(inputs: &Bundle, bundle: &mut Bundle, name: &str, change: impl Fn(&mut [f64])) {
+    let triangles = inputs.triangles("F").map_or(0, |faces| faces.len());
+    let d = row_length(bundle, name);
+    numbers(bundle, name, |z| {
+        z.chunks_mut(d)
+            .for_each(|row| change(&mut row[9 * triangles..d - 6]));
     });
 }
 

@@ -7,6 +7,7 @@
 //! | `timing.csv` | [`TimingRow`]: one a case and engine that was timed |
 //! | `raw/samples.csv` | [`SampleRow`]: every timing sample |
 //! | `figures.json` | [`FitFigures`]: what the pictures of a fit are drawn from |
+//! | `exhibits.json` | [`Exhibit`]: what the algorithms do, to look at; not in records from before there were any |
 //! | `engines.csv` | [`EngineRow`]: each engine's receipt, or how to get it |
 //! | `machine.txt`, `command.txt` | where and how it was run |
 //! | `report.html` | made from the files above |
@@ -15,6 +16,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
+
+use crate::exhibits::Exhibit;
 
 /// What came of asking an engine for a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -132,7 +135,10 @@ pub struct EngineRow {
 pub struct FitFigures {
     pub case: String,
     pub dataset: String,
-    /// d, the numbers in one frame (3V in vertex space); with k, l, m and n it tells which row of Table 1 is the same fit.
+    /// The shape space that the signals are in; records from before there were others do not say so.
+    #[serde(default = "vertex")]
+    pub space: String,
+    /// d, the numbers in one frame of that space.
     pub d: usize,
     /// As used: k, l, m and the number of frames.
     pub k: usize,
@@ -149,18 +155,20 @@ pub struct FitFigures {
     pub control: Vec<[f64; 2]>,
     /// Frames (0-based) that are sites of g.
     pub sites: Vec<usize>,
-    /// RMS vertex distance of psi(i) from frame i over the first frame's diagonal.
+    /// RMS vertex distance of psi(i), decoded, from frame i over the first frame's diagonal.
     pub frame_errors: Vec<f64>,
     /// Singular values of the centred frames, decreasing.
     pub singular_values: Vec<f64>,
-    /// Relative RMS error (2) against m, with k and l as they are; likewise l and k. Pairs (constant, error).
+    /// The same over all frames against m, with k and l as they are; likewise l and k. Pairs (constant, error).
     pub error_by_m: Vec<(usize, f64)>,
     pub error_by_l: Vec<(usize, f64)>,
     pub error_by_k: Vec<(usize, f64)>,
-    /// The sums (3), (4), (7), (2).
+    /// The sums (3), (4), (7), (2), in the units of the space squared.
     pub errors: [f64; 4],
-    /// Milliseconds h, mds, rbf, g, f as Table 1 counts them.
-    pub milliseconds: [f64; 5],
+}
+
+fn vertex() -> String {
+    "vertex".into()
 }
 
 /// Everything one run found.
@@ -172,6 +180,7 @@ pub struct Record {
     pub samples: Vec<SampleRow>,
     pub engines: Vec<EngineRow>,
     pub figures: Vec<FitFigures>,
+    pub exhibits: Vec<Exhibit>,
     /// Lines such as `skipped: no data for signal/pipeline/cow: ...`.
     pub skipped: Vec<String>,
     pub machine: String,
@@ -210,12 +219,8 @@ impl Record {
         write_table(&folder.join("timing.csv"), &self.timing)?;
         write_table(&folder.join("raw/samples.csv"), &self.samples)?;
         write_table(&folder.join("engines.csv"), &self.engines)?;
-        let path = folder.join("figures.json");
-        let json = serde_json::to_string(&self.figures).map_err(|source| RecordError::Json {
-            path: path.clone(),
-            source,
-        })?;
-        write_text(&path, &json)?;
+        write_json(&folder.join("figures.json"), &self.figures)?;
+        write_json(&folder.join("exhibits.json"), &self.exhibits)?;
         write_text(&folder.join("skipped.txt"), &self.skipped.join("\n"))?;
         write_text(&folder.join("machine.txt"), &self.machine)?;
         write_text(&folder.join("command.txt"), &self.command)
@@ -223,15 +228,18 @@ impl Record {
 
     /// Reads a record back.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
-        let path = folder.join("figures.json");
+        let exhibits = folder.join("exhibits.json");
         Ok(Self {
             agreement: read_table(&folder.join("agreement.csv"))?,
             accuracy: read_table(&folder.join("accuracy.csv"))?,
             timing: read_table(&folder.join("timing.csv"))?,
             samples: read_table(&folder.join("raw/samples.csv"))?,
             engines: read_table(&folder.join("engines.csv"))?,
-            figures: serde_json::from_str(&read_text(&path)?)
-                .map_err(|source| RecordError::Json { path, source })?,
+            figures: read_json(&folder.join("figures.json"))?,
+            exhibits: match exhibits.exists() {
+                true => read_json(&exhibits)?,
+                false => Vec::new(),
+            },
             skipped: read_text(&folder.join("skipped.txt"))?
                 .lines()
                 .map(String::from)
@@ -251,6 +259,21 @@ fn write_text(path: &Path, text: &str) -> Result<(), RecordError> {
 
 fn read_text(path: &Path) -> Result<String, RecordError> {
     std::fs::read_to_string(path).map_err(|source| RecordError::File {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), RecordError> {
+    let json = serde_json::to_string(value).map_err(|source| RecordError::Json {
+        path: path.to_owned(),
+        source,
+    })?;
+    write_text(path, &json)
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, RecordError> {
+    serde_json::from_str(&read_text(path)?).map_err(|source| RecordError::Json {
         path: path.to_owned(),
         source,
     })

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use faer::MatRef;
 use tempfile::TempDir;
 use thiserror::Error;
 
@@ -288,12 +287,7 @@ impl Session {
         let chosen = sequence
             .select(&indices)
             .map_err(|e| wrong(e.to_string()))?;
-        let frames = MatRef::from_column_major_slice(
-            chosen.positions(),
-            chosen.dimension(),
-            chosen.frame_count(),
-        );
-        super::figures::draw(case, frames).map_err(|e| wrong(e.to_string()))
+        super::figures::draw(case, &chosen).map_err(|e| wrong(e.to_string()))
     }
 }
 

@@ -60,6 +60,32 @@ tolerances! {
         "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
         "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
     }
+    "shape.poisson_factor" {
+        "backward_error" <= 1e-14, "a factorisation is backward stable";
+        "solution_difference" <= 1e-9, "the condition of a Poisson matrix with slivers, 1e5, times the backward errors";
+    }
+    "shape.poisson_solve" {
+        "backward_error" <= 1e-14, "a factorisation is backward stable";
+        "solution_difference" <= 1e-9, "the condition of a Poisson matrix with slivers, 1e5, times the backward errors";
+    }
+    "shape.halfway" {
+        "share_of_means" <= 0.1, "a limb that bends keeps its length; the mean of positions cuts across";
+        "length_difference" <= 0.02, "another energy: as-rigid-as-possible surfaces stretch a little where they bend";
+    }
+    "shape.patch_encode" {
+        "formula" <= 1e-12, "R_p R S times the reference's edges are the frame's edges, over the diagonal, R_p along a chain of patches";
+        "stretch" <= 1e-12, "a stretch has no negative eigenvalue";
+        "mean" <= 1e-12, "R_p is the rotation nearest to the mean, so that of what is left is none";
+        "joints" <= 1e-12, "the rotations of pairs of patches agree around every loop";
+        "placement" <= 1e-13, "a mean of vertices, over the diagonal; a vertex by itself does not turn";
+        "rotation_difference" <= 1e-10, "as gradients: slivers";
+        "patch_difference" <= 1e-12, "means over areas, in which slivers hardly count";
+        "number_difference" <= 1e-10, "as gradients: slivers";
+    }
+    "shape.patch_decode" {
+        "round_trip" <= 1e-11, "a consistent z gives its frame back, over the diagonal (DESIGN.md, 7)";
+        "frame_difference" <= 1e-11, "the same two systems by other factorisations, over the diagonal";
+    }
     "signal.h" {
         "mean" <= 1e-14, "a mean of n frames";
         "orthonormality" <= 1e-9, "the Gram route is taken down to squared ratios of 1e-6, which costs eps / 1e-6";
@@ -135,6 +161,21 @@ tolerances! {
     "signal.psi" {
         "formula" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
         "frame_difference" <= 1e-9, "three formulas in a row; kernels and coefficients cancel";
+    }
+    "signal.insert_knots" {
+        "knots" <= 0.0, "old and new knots, merged";
+        "formula" <= 1e-13, "values are those of the new control points";
+        "curve" <= 1e-13, "the curve stays: averages of control points, over their extent";
+        "u_difference" <= 0.0, "old and new knots, merged";
+        "control_difference" <= 1e-12, "one set of control points keeps the curve; other ways to find it round in another order";
+        "value_difference" <= 1e-12, "the same curve";
+    }
+    "signal.transfer" {
+        "stationarity" <= 1e-13, "a least-squares residual is orthogonal to the examples, over the norms of both";
+        "formula" <= 1e-13, "frames are sums of examples, over their greatest number";
+        "examples" <= 1e-9, "an example becomes its partner: eps times the condition of the examples, below 1e5 (issue 4)";
+        "coordinate_difference" <= 1e-9, "least squares by another factorisation: eps times the condition of the examples, squared by the normal equations";
+        "frame_difference" <= 1e-9, "as coordinates";
     }
     "signal" {
         "claimed_error_psi" <= 1e-9, "error (2) again from the frames";

@@ -1,12 +1,13 @@
 //! Dense factorisations of faer, on one thread, with errors in place of panics.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
 use faer::linalg::{evd, householder, qr, svd, triangular_solve};
 use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, diag::Diag};
 use thiserror::Error;
 
-use super::kernels::clear_upper_halves;
+use super::kernels::{axpy, clear_upper_halves, dot};
 
 /// Why a dense factorisation failed.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -188,6 +189,44 @@ impl Qr {
     }
 }
 
+/// A = L L^T of a symmetric positive definite matrix.
+pub struct Cholesky {
+    lower: Mat<f64>,
+}
+
+impl Cholesky {
+    /// Factors A, of which the lower triangle is read, overwriting it; None where it is not positive definite. O(n^3 / 3).
+    pub fn new(mut a: Mat<f64>) -> Option<Self> {
+        let n = a.nrows();
+        let scratch =
+            llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
+        let factored = llt::factor::cholesky_in_place(
+            a.as_mut(),
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            Default::default(),
+        );
+        clear_upper_halves();
+        factored.ok().map(|_| Self { lower: a })
+    }
+
+    /// Replaces b by A^-1 b. O(n^2).
+    pub fn solve(&self, b: &mut [f64]) {
+        let n = self.lower.nrows();
+        for j in 0..n {
+            let column = &self.lower.col_as_slice(j)[j..];
+            b[j] /= column[0];
+            let (head, tail) = b[j..].split_at_mut(1);
+            axpy(-head[0], &column[1..], tail);
+        }
+        for j in (0..n).rev() {
+            let column = &self.lower.col_as_slice(j)[j..];
+            b[j] = (b[j] - dot(&column[1..], &b[j + 1..])) / column[0];
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,6 +248,18 @@ mod tests {
     }
 
     #[test]
+    fn cholesky_solves_and_refuses() {
+        let a = sample(12, 7);
+        let normal = a.transpose() * &a;
+        let x: Vec<f64> = (0..7).map(|i| (i as f64).cos()).collect();
+        let product = |i: usize| (0..7).map(|j| normal[(i, j)] * x[j]).sum();
+        let mut b: Vec<f64> = (0..7).map(product).collect();
+        Cholesky::new(normal.clone()).unwrap().solve(&mut b);
+        assert!(b.iter().zip(&x).all(|(b, x)| (b - x).abs() < 1e-9));
+        assert!(Cholesky::new(-normal).is_none());
+    }
+
+    #[test]
     fn svd_and_eigen_agree() {
         let a = sample(12, 5);
         let svd = thin_svd(a.as_ref()).unwrap();
@@ -216,5 +267,16 @@ mod tests {
         for (s, lambda) in svd.s.iter().zip(&eigen.values) {
             assert!((s * s - lambda).abs() < 1e-12 * eigen.values[0]);
         }
+    }
+
+    #[test]
+    fn cholesky_solves_what_is_positive_and_refuses_the_rest() {
+        let a = sample(9, 5);
+        let (gram, x) = (a.transpose() * &a, sample(5, 1));
+        let mut found = &gram * &x;
+        let factor = Cholesky::new(gram.clone()).unwrap();
+        factor.solve(found.col_as_slice_mut(0));
+        assert!((found - &x).norm_max() < 1e-8);
+        assert!(Cholesky::new(-gram).is_none());
     }
 }

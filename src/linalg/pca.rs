@@ -213,7 +213,7 @@ fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, Fact
 }
 
 /// Turns each column so that its entry of largest magnitude (the first of equals) is positive; returns the signs applied.
-fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
+pub(crate) fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
     (0..basis.ncols())
         .map(|j| {
             let column = basis.col_as_slice_mut(j);

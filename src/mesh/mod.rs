@@ -4,6 +4,7 @@ mod connectivity;
 pub mod dihedral;
 pub mod distance;
 pub mod measure;
+pub mod orientation;
 pub mod topology;
 mod triangle;
 pub(crate) mod vector;

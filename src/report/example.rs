@@ -1,5 +1,6 @@
 //! A made-up record for the tests: what a run looks like, and what a hostile or broken one does.
 
+use crate::exhibits::{Chart, Exhibit, Line, Panel, Picture, Style, Table as Sheet};
 use crate::harness::record::{
     AccuracyRow, AgreementRow, EngineRow, FitFigures, Record, SampleRow, TimingRow, Verdict,
 };
@@ -183,7 +184,7 @@ fn time(record: &mut Record, case: &str, stage: &str, engine: &str, seed: (usize
         least_seconds: median * 0.94,
         ratio_to_rust: ratio,
         published_seconds: paper,
-        published_source: paper.map_or(String::new(), |_| "Cashman & Hormann 2012, Table 1".into()),
+        published_source: paper.map_or(String::new(), |_| "Table 1, Figure 6".into()),
     });
     for round in 0..9 {
         record.samples.push(SampleRow {
@@ -248,6 +249,7 @@ fn horse() -> FitFigures {
     FitFigures {
         case: "signal/pipeline/horse".into(),
         dataset: "horse".into(),
+        space: "vertex".into(),
         d: 25293,
         k: 16,
         l: 12,
@@ -286,7 +288,6 @@ fn horse() -> FitFigures {
             .map(|k| (k, 0.0078 + 0.2 * 0.7f64.powi(k as i32)))
             .collect(),
         errors: [38.163, 44.868, 4.1230, 90.799],
-        milliseconds: [6.1, 0.8, 0.05, 0.6, 0.09],
     }
 }
 
@@ -343,6 +344,7 @@ pub(super) fn broken() -> Record {
     for row in &mut record.engines {
         (row.version, row.descent, row.stages) = (HOSTILE.into(), HOSTILE.into(), HOSTILE.into());
     }
+    record.exhibits = vec![hostile_exhibit(&bad)];
     record.skipped = vec![HOSTILE.into(), String::new()];
     (record.machine, record.command) = (HOSTILE.into(), HOSTILE.into());
     record
@@ -370,7 +372,6 @@ fn figures(bad: &[f64]) -> Vec<FitFigures> {
         error_by_k: vec![(usize::MAX, 1.0), (0, 0.0)],
         frames: numbers.len(),
         errors: [f64::NAN; 4],
-        milliseconds: [f64::NAN, 0.0, -1.0, f64::INFINITY, 1e300],
         ..horse()
     };
     let same = [[1.5, -2.0]; 9];
@@ -380,4 +381,47 @@ fn figures(bad: &[f64]) -> Vec<FitFigures> {
         fit(&same, &[1e-3; 9], &[(3, 1e-3); 9]),
         fit(&points, bad, &pairs),
     ]
+}
+
+/// Words and numbers that would break a page, in every kind of panel.
+fn hostile_exhibit(bad: &[f64]) -> Exhibit {
+    let points: Vec<[f64; 2]> = bad.iter().map(|&x| [x, -x]).collect();
+    let line = |style| Line {
+        name: HOSTILE.into(),
+        style,
+        points: points.clone(),
+    };
+    let chart = |equal, logarithmic, lines| {
+        Panel::Chart(Chart {
+            title: HOSTILE.into(),
+            x_title: HOSTILE.into(),
+            y_title: HOSTILE.into(),
+            equal,
+            logarithmic,
+            lines,
+        })
+    };
+    let styles = [Style::Line, Style::Dashes, Style::Dots, Style::Squares];
+    Exhibit {
+        name: HOSTILE.into(),
+        title: HOSTILE.into(),
+        look: HOSTILE.into(),
+        datasets: vec![HOSTILE.into()],
+        panels: vec![
+            Panel::Table(Sheet {
+                caption: HOSTILE.into(),
+                heads: vec![HOSTILE.into(); 3],
+                rows: vec![vec![HOSTILE.into(); 2], Vec::new()],
+            }),
+            chart(true, false, styles.map(line).to_vec()),
+            chart(false, true, styles.map(line).to_vec()),
+            chart(true, true, Vec::new()),
+            Panel::Picture(Picture {
+                title: HOSTILE.into(),
+                png: HOSTILE.into(),
+                width: u32::MAX,
+                height: 0,
+            }),
+        ],
+    }
 }

@@ -4,7 +4,9 @@ use super::format::count;
 use super::markup::{section, strip_tags};
 use super::order::{RUST, distinct};
 use super::verdicts::{VERDICTS, badge, class, counts, meaning, symbol};
-use super::{PublishedRow, accuracy, engines, pictures, summary, table1, timing, verdicts};
+use super::{
+    PublishedRow, accuracy, engines, exhibits, pictures, summary, table1, timing, verdicts,
+};
 use crate::harness::record::{AgreementRow, Record, Verdict};
 
 const STYLE: &str = include_str!("style.css");
@@ -67,7 +69,12 @@ fn sections(
         (
             "table1",
             "Timing, beside the paper",
-            table1::table(&record.figures, published),
+            table1::table(record, published),
+        ),
+        (
+            "exhibits",
+            "What the algorithms do",
+            exhibits::all(&record.exhibits),
         ),
         (
             "pictures",

@@ -3,7 +3,7 @@
 //! | file | what it makes |
 //! |---|---|
 //! | `html` | the page |
-//! | `verdicts`, `accuracy`, `timing`, `table1`, `engines`, `pictures` | its sections |
+//! | `exhibits`, `verdicts`, `accuracy`, `timing`, `table1`, `engines`, `pictures` | its sections |
 //! | `summary` | every stage in one line, for the page and for the README |
 //! | `plots` | pictures, as SVG text |
 //! | `readme` | the README's table and picture, and [`splice`] |
@@ -16,6 +16,7 @@ mod accuracy;
 mod engines;
 #[cfg(test)]
 mod example;
+mod exhibits;
 mod format;
 mod html;
 mod markup;
@@ -34,3 +35,4 @@ mod verdicts;
 pub use html::html;
 pub use published::{PublishedError, PublishedRow, TABLE_1};
 pub use readme::{SpliceError, readme_picture, readme_table, splice};
+pub use table1::table_1_text;

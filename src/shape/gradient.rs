@@ -4,10 +4,11 @@
 //! After all triangles: the centre of each component over the diagonal.
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
+use super::branches::Neighbours;
 use super::deformation::{Deformation, LANES, Lanes};
 use super::poisson::{Gradient, Poisson};
 use super::reference::{Reference, check, check_len};
@@ -15,6 +16,7 @@ use super::{ShapeError, Space, SpaceKind};
 use crate::linalg::kernels::vectorised;
 use crate::linalg::rotation::{apply, exp, log, nearest_branch};
 use crate::mesh::Connectivity;
+use crate::mesh::topology::Topology;
 
 /// Numbers of a triangle.
 pub(super) const NUMBERS: usize = 9;
@@ -29,6 +31,8 @@ pub struct GradientSpace {
     reference: Reference,
     deformation: Deformation,
     poisson: Poisson,
+    /// Only poses that no motion joins need it.
+    neighbours: OnceLock<Neighbours>,
 }
 
 impl GradientSpace {
@@ -38,7 +42,21 @@ impl GradientSpace {
         Ok(Self {
             deformation: Deformation::new(&reference),
             poisson: Poisson::new(&reference)?,
+            neighbours: OnceLock::new(),
             reference,
+        })
+    }
+
+    /// Triangles across edges, degenerate ones left out.
+    fn neighbours(&self) -> &Neighbours {
+        self.neighbours.get_or_init(|| {
+            let topology = Topology::new(self.reference.faces());
+            let sound = |t: u32| self.reference.triangles[t as usize].is_some();
+            let pairs = topology
+                .pairs()
+                .map(|p| [p.first.triangle, p.second.triangle]);
+            let pairs: Vec<_> = pairs.filter(|&[f, g]| sound(f) && sound(g)).collect();
+            Neighbours::new(self.reference.faces().len(), pairs.iter().copied())
         })
     }
 
@@ -88,22 +106,36 @@ impl Space for GradientSpace {
     }
 
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {
-        let end = self.triangle_numbers().min(z.len()).min(previous.len());
-        let before = previous[..end].par_chunks(NUMBERS * ALONE);
-        z[..end]
-            .par_chunks_mut(NUMBERS * ALONE)
-            .zip(before)
-            .for_each(|(z, before)| {
-                let before = before.as_chunks::<NUMBERS>().0;
-                for (z, before) in z.as_chunks_mut::<NUMBERS>().0.iter_mut().zip(before) {
-                    let (vector, to) = (&mut z[..3], &before[..3]);
-                    vector.copy_from_slice(&nearest_branch(
-                        [vector[0], vector[1], vector[2]],
-                        [to[0], to[1], to[2]],
-                    ));
-                }
-            });
+        let end = self.triangle_numbers();
+        if previous.len() == self.dimension() && z.len() == self.dimension() {
+            unwrap_triangles(&previous[..end], &mut z[..end]);
+        }
     }
+
+    fn unwrap_over_surface(&self, z: &mut [f64]) {
+        let end = self.triangle_numbers().min(z.len());
+        let numbers = z[..end].as_chunks_mut::<NUMBERS>().0.iter_mut();
+        let mut vectors: Vec<_> = numbers.filter_map(|z| z.first_chunk_mut::<3>()).collect();
+        if vectors.len() == self.reference.faces().len() {
+            self.neighbours().unwrap(&mut vectors);
+        }
+    }
+}
+
+/// Chooses the branches of the rotation vectors of triangles, nine numbers each, nearest to those of `previous`.
+pub(super) fn unwrap_triangles(previous: &[f64], z: &mut [f64]) {
+    let before = previous.par_chunks(NUMBERS * ALONE);
+    let both = z.par_chunks_mut(NUMBERS * ALONE).zip(before);
+    both.for_each(|(z, before)| {
+        let before = before.as_chunks::<NUMBERS>().0;
+        for (z, before) in z.as_chunks_mut::<NUMBERS>().0.iter_mut().zip(before) {
+            let (vector, to) = (&mut z[..3], &before[..3]);
+            vector.copy_from_slice(&nearest_branch(
+                [vector[0], vector[1], vector[2]],
+                [to[0], to[1], to[2]],
+            ));
+        }
+    });
 }
 
 vectorised! {
@@ -131,7 +163,7 @@ vectorised! {
 
 vectorised! {
     /// The gradients of triangles from `first` on, a multiple of the lanes.
-    fn decode_triangles(deformation: &Deformation, first: usize, z: &[[f64; NUMBERS]], out: &mut [Gradient]) {
+    pub(super) fn decode_triangles(deformation: &Deformation, first: usize, z: &[[f64; NUMBERS]], out: &mut [Gradient]) {
         for (block, (z, out)) in z.chunks(LANES).zip(out.chunks_mut(LANES)).enumerate() {
             let mut numbers = Lanes::<NUMBERS>::ZERO;
             for (lane, z) in z.iter().enumerate() {

@@ -8,12 +8,18 @@
 //! | [`vertex`] | 3V | positions |
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 //! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
+//! | [`patch`] | 9F + 3A + 6C | gradients against the mean rotations of patches, those against adjacent ones, rotations and centres of components |
 
+pub mod branches;
 mod deformation;
 pub mod frames;
 pub mod gradient;
+pub mod halfway;
 pub mod hinges;
 pub mod lric;
+pub mod partition;
+pub mod patch;
+pub mod patches;
 pub mod placement;
 pub mod poisson;
 mod pool;
@@ -32,6 +38,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use self::partition::PatchError;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
@@ -44,11 +51,13 @@ pub enum SpaceKind {
     Gradient,
     /// Linear rotation-invariant coordinates (Lipman et al. 2005).
     Lric,
+    /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
+    Patch,
 }
 
 impl SpaceKind {
     /// Every space, in the order of the paper.
-    pub const ALL: [Self; 3] = [Self::Vertex, Self::Gradient, Self::Lric];
+    pub const ALL: [Self; 4] = [Self::Vertex, Self::Gradient, Self::Lric, Self::Patch];
 
     /// Its name on the command line and in stages.
     pub fn name(self) -> &'static str {
@@ -56,6 +65,7 @@ impl SpaceKind {
             Self::Vertex => "vertex",
             Self::Gradient => "gradient",
             Self::Lric => "lric",
+            Self::Patch => "patch",
         }
     }
 }
@@ -68,7 +78,7 @@ impl fmt::Display for SpaceKind {
 
 /// A name that no space has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no shape space `{0}`; there are vertex, gradient and lric")]
+#[error("there is no shape space `{0}`; there are vertex, gradient, lric and patch")]
 pub struct UnknownSpace(String);
 
 impl FromStr for SpaceKind {
@@ -99,6 +109,9 @@ pub enum ShapeError {
     /// See [`FactorError`].
     #[error("the equations of the space cannot be solved: {0}")]
     Factor(#[from] FactorError),
+    /// See [`PatchError`].
+    #[error(transparent)]
+    Patch(#[from] PatchError),
     /// What is wrong with one of several frames.
     #[error("frame {frame} (1-based): {source}")]
     Frame {
@@ -129,42 +142,96 @@ pub trait Space: Send + Sync {
 
     /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
     fn unwrap(&self, _previous: &[f64], _z: &mut [f64]) {}
+
+    /// Chooses the branches of the angles in `z` so that they change least from place to place on the surface: for poses that no motion joins.
+    fn unwrap_over_surface(&self, _z: &mut [f64]) {}
 }
 
 /// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.
+///
+/// `patches` is the patch of each triangle, see [`patches::choose`]; only the space of patches looks at it, the others may be given none.
 pub fn prepare(
     kind: SpaceKind,
     connectivity: Arc<Connectivity>,
     reference: &[f64],
+    patches: &[i64],
 ) -> Result<Box<dyn Space>, ShapeError> {
     Ok(match kind {
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
         SpaceKind::Lric => Box::new(lric::LricSpace::new(connectivity, reference)?),
+        SpaceKind::Patch => Box::new(patch::PatchSpace::new(connectivity, reference, patches)?),
     })
+}
+
+/// Prepares a space over the first of these frames (3V positions each), with patches found from all of them where the space has some.
+pub fn prepare_for(
+    kind: SpaceKind,
+    connectivity: &Arc<Connectivity>,
+    frames: &[f64],
+) -> Result<Box<dyn Space>, ShapeError> {
+    let len = 3 * connectivity.vertex_count();
+    let reference = frames.get(..len).unwrap_or(frames);
+    let patches = patches_for(kind, connectivity, reference, frames)?;
+    prepare(kind, connectivity.clone(), reference, &patches)
+}
+
+/// The patches that [`prepare`] wants for this space, found from these frames; none for spaces that have none.
+pub fn patches_for(
+    kind: SpaceKind,
+    connectivity: &Arc<Connectivity>,
+    reference: &[f64],
+    frames: &[f64],
+) -> Result<Vec<i64>, ShapeError> {
+    match kind {
+        SpaceKind::Patch => patches::choose(connectivity.clone(), reference, frames),
+        _ => Ok(Vec::new()),
+    }
 }
 
 /// The vectors of n frames (n x 3V positions, frame after frame) as the columns of a d x n matrix. Frames run in parallel, then branches are
 /// chosen; the result does not depend on the number of threads.
 pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
+    let mut z = encode_each(space, frames)?;
+    let mut columns = columns_mut(&mut z);
+    for i in 1..columns.len() {
+        let (before, after) = columns.split_at_mut(i);
+        space.unwrap(before[i - 1], after[0]);
+    }
+    Ok(z)
+}
+
+/// The same for examples, of which the first shows a reference pose: branches are those nearest to it.
+pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
+    let mut z = encode_each(space, frames)?;
+    if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {
+        others.iter_mut().for_each(|z| {
+            space.unwrap(first, z);
+            space.unwrap_over_surface(z);
+        });
+    }
+    Ok(z)
+}
+
+/// The columns of a matrix of our own, which are contiguous.
+fn columns_mut(z: &mut Mat<f64>) -> Vec<&mut [f64]> {
+    let columns = z.col_iter_mut();
+    let columns = columns.filter_map(|column| column.try_as_col_major_mut());
+    columns.map(|column| column.as_slice_mut()).collect()
+}
+
+/// Every frame's vector on its own, with angles in their principal branches.
+fn encode_each(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let len = space.frame_len().max(1);
     let n = frames.len() / len;
     reference::check_len("frames", frames, n * len)?;
     let mut z = Mat::zeros(space.dimension(), n);
-    // The columns of a matrix of our own are contiguous.
-    let columns = z
-        .col_iter_mut()
-        .filter_map(|column| column.try_as_col_major_mut());
-    let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
+    let mut columns = columns_mut(&mut z);
     let both = columns.par_iter_mut().zip(frames.par_chunks_exact(len));
     first_error(
         both.enumerate()
             .map(|(i, (z, frame))| space.encode(frame, z).map_err(|e| e.of_frame(i))),
     )?;
-    for i in 1..n {
-        let (before, after) = columns.split_at_mut(i);
-        space.unwrap(before[i - 1], after[0]);
-    }
     Ok(z)
 }
 

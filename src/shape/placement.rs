@@ -1,5 +1,5 @@
-//! Where the components of a surface are, six numbers each: the rotation vector of the component's lowest triangle that is not degenerate, from the
-//! reference, of the axes that [`posed`] gives; then the component's centre over the diagonal. A component of one vertex has no rotation: zeros.
+//! Where the components of a surface are, six numbers each: the rotation vector of the component from the reference, by default that of its lowest triangle
+//! that is not degenerate, of the axes that [`posed`] gives; then the component's centre over the diagonal. A component of one vertex has no rotation: zeros.
 
 use super::posed::{posed, rest_axes};
 use super::reference::{Reference, Triangle};
@@ -11,9 +11,18 @@ pub const NUMBERS: usize = 6;
 
 /// Writes the 6C numbers of a frame.
 pub fn encode(reference: &Reference, positions: &[f64], z: &mut [f64]) {
+    encode_turned(reference, positions, rotations_of(reference, positions), z);
+}
+
+/// [`encode`] with other rotations of the components; none is zeros.
+pub fn encode_turned(
+    reference: &Reference,
+    positions: &[f64],
+    rotations: impl Iterator<Item = Option<Matrix>>,
+    z: &mut [f64],
+) {
     let mut centres = vec![0.0; 3 * reference.components.len()];
     reference.centres(positions, &mut centres);
-    let rotations = rotations_of(reference, positions);
     let parts = z.as_chunks_mut::<NUMBERS>().0.iter_mut();
     for ((z, rotation), centre) in parts.zip(rotations).zip(centres.as_chunks::<3>().0) {
         z[..3].copy_from_slice(&rotation.map_or([0.0; 3], |r| log(&r)));

@@ -45,19 +45,14 @@ struct Work {
 impl Poisson {
     /// Builds and factors the system.
     pub fn new(reference: &Reference) -> Result<Self, ShapeError> {
-        let unknowns = unknowns(reference);
-        let n = reference.vertex_count() - reference.components.len();
+        let System {
+            unknowns,
+            entries,
+            values,
+            n,
+        } = system(reference);
         let corners = |f: usize| reference.faces()[f].map(|v| unknowns[v as usize]);
         let triangles = reference.triangles.iter().enumerate();
-        let (mut entries, mut values) = (Vec::new(), Vec::new());
-        for (f, triangle) in triangles.clone().filter_map(|(f, t)| Some((f, (*t)?))) {
-            for (entry, value) in stiffness(corners(f), &triangle) {
-                if entry.iter().all(|&i| (i as usize) < n) {
-                    entries.push(entry);
-                    values.push(value);
-                }
-            }
-        }
         let elements = triangles
             .map(|(f, triangle)| Element::new(corners(f), triangle))
             .collect();
@@ -126,6 +121,40 @@ impl Element {
             x[b][k] += second;
             x[c][k] += third;
         }
+    }
+}
+
+/// The symmetric matrix of a reference.
+#[derive(Debug)]
+pub struct System {
+    /// Number of unknowns, V - C.
+    pub n: usize,
+    /// The unknown of every vertex; that of grounded ones is n.
+    pub unknowns: Vec<u32>,
+    /// Places on one side of the diagonal, either one, some given more than once, and their values, which add up.
+    pub entries: Vec<[u32; 2]>,
+    pub values: Vec<f64>,
+}
+
+/// The matrix of the normal equations, from the stiffness of the triangles that are not degenerate. O(F).
+pub fn system(reference: &Reference) -> System {
+    let unknowns = unknowns(reference);
+    let n = reference.vertex_count() - reference.components.len();
+    let (mut entries, mut values) = (Vec::new(), Vec::new());
+    for (face, triangle) in reference.faces().iter().zip(&reference.triangles) {
+        let Some(triangle) = triangle else { continue };
+        for (entry, value) in stiffness(face.map(|v| unknowns[v as usize]), triangle) {
+            if entry.iter().all(|&i| (i as usize) < n) {
+                entries.push(entry);
+                values.push(value);
+            }
+        }
+    }
+    System {
+        n,
+        unknowns,
+        entries,
+        values,
     }
 }
 

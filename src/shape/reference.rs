@@ -128,6 +128,13 @@ impl Reference {
         self.labels[self.faces()[face][0] as usize] as usize
     }
 
+    /// The area of each triangle over the squared diagonal, F; 0 for degenerate ones.
+    pub fn area_shares(&self) -> Vec<f64> {
+        let share = |t: &Triangle| 0.5 * (t.length / self.diagonal) * (t.height / self.diagonal);
+        let triangles = self.triangles.iter();
+        triangles.map(|t| t.as_ref().map_or(0.0, share)).collect()
+    }
+
     /// Writes the centre of each component of a frame over the diagonal, 3 numbers each.
     pub fn centres(&self, positions: &[f64], out: &mut [f64]) {
         self.means(positions, out);

@@ -6,22 +6,27 @@ use std::sync::Arc;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
-use super::{Space, SpaceKind, decode_all, encode_all, prepare};
+use super::{Space, SpaceKind, decode_all, encode_all, patches, prepare};
 use crate::mesh::Connectivity;
 use crate::mesh::measure::bounds;
 use crate::sequence::synthetic::embedded;
 use crate::sequence::synthetic::roll::{SMALL, roll_strip};
 
-const KINDS: [SpaceKind; 2] = [SpaceKind::Gradient, SpaceKind::Lric];
+const KINDS: [SpaceKind; 3] = [SpaceKind::Gradient, SpaceKind::Lric, SpaceKind::Patch];
 
+/// With patches by how these frames move.
 fn space(
     kind: SpaceKind,
-    vertices: usize,
-    faces: &[[u32; 3]],
+    connectivity: &Arc<Connectivity>,
     reference: &[f64],
+    frames: &[f64],
 ) -> Box<dyn Space> {
-    let connectivity = Connectivity::new(vertices, faces.to_vec()).unwrap();
-    prepare(kind, Arc::new(connectivity), reference).unwrap()
+    let labels = patches::choose(connectivity.clone(), reference, frames).unwrap();
+    prepare(kind, connectivity.clone(), reference, &labels).unwrap()
+}
+
+fn mesh(vertices: usize, faces: &[[u32; 3]]) -> Arc<Connectivity> {
+    Arc::new(Connectivity::new(vertices, faces.to_vec()).unwrap())
 }
 
 fn flat(points: &[Vector3<f64>]) -> Vec<f64> {
@@ -63,7 +68,8 @@ fn embedded_sequences_come_back() {
         let sequence = embedded(name).unwrap();
         let size = bounds(sequence.frame(0)).diagonal();
         for kind in KINDS {
-            let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0)).unwrap();
+            let mesh = sequence.connectivity();
+            let space = space(kind, mesh, sequence.frame(0), sequence.positions());
             let z = encode_all(&*space, sequence.positions()).unwrap();
             let found = worst(
                 sequence.positions(),
@@ -107,7 +113,7 @@ proptest! {
         let (faces, reference) = odd();
         let frame: Vec<f64> = reference.iter().zip(&jitter).map(|(x, j)| x + j).collect();
         for kind in KINDS {
-            let space = space(kind, 10, &faces, &reference);
+            let space = space(kind, &mesh(10, &faces), &reference, &frame);
             // Three components; [0, 9, 1] has no area and no say, so only what its neighbours hold comes back.
             let found = round_trip(&*space, &frame);
             prop_assert!(found < 1e-12, "{kind}: {found}");
@@ -124,7 +130,7 @@ proptest! {
         let other = moved(frame, &turn, Vector3::from(by));
         let faces = sequence.connectivity().faces();
         for kind in KINDS {
-            let space = space(kind, reference.len() / 3, faces, reference);
+            let space = space(kind, sequence.connectivity(), reference, sequence.positions());
             let both = [frame, &other].map(|f| encode_all(&*space, f).unwrap());
             let [a, b] = [0, 1].map(|i| both[i].col_as_slice(0));
             match kind {
@@ -177,7 +183,7 @@ fn a_moebius_band_comes_back() {
         faces.extend([[a, c, b], [b, c, d]]);
     }
     for kind in KINDS {
-        let space = space(kind, 2 * n, &faces, &band(0.5));
+        let space = space(kind, &mesh(2 * n, &faces), &band(0.5), &band(0.8));
         let found = round_trip(&*space, &band(0.8));
         assert!(found < 1e-12, "{kind}: {found}");
     }
@@ -185,34 +191,36 @@ fn a_moebius_band_comes_back() {
 
 /// A strip rolled by an angle, halfway to flat, is the strip rolled by half of it: its angles are known, and its lengths do not change.
 #[test]
-fn lric_rolls_by_half() {
+fn a_roll_rolls_by_half() {
     let flat_strip = flat(&roll_strip(0.0, &SMALL));
     let roll = embedded("@roll-small").unwrap();
     let size = bounds(&flat_strip).diagonal();
-    let space = prepare(SpaceKind::Lric, roll.connectivity().clone(), &flat_strip).unwrap();
     for degrees in [90.0f64, 170.0, 350.0, 700.0] {
         let angle = degrees.to_radians();
         let frames = [flat_strip.clone(), flat(&roll_strip(angle, &SMALL))].concat();
-        let z = encode_all(&*space, &frames).unwrap();
-        let half: Vec<f64> = (0..z.nrows())
-            .map(|a| 0.5 * (z[(a, 0)] + z[(a, 1)]))
-            .collect();
-        let mut found = vec![0.0; flat_strip.len()];
-        space.decode(&half, &mut found).unwrap();
-        let expected = flat(&roll_strip(angle / 2.0, &SMALL));
-        // Up to a rigid motion: compare distances of all vertices from a few.
-        let distances = |x: &[f64]| -> Vec<f64> {
-            let points: Vec<Vector3<f64>> =
-                x.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
-            let picks = [0, points.len() / 3, points.len() / 2, points.len() - 1];
-            picks
-                .iter()
-                .flat_map(|&i| points.iter().map(move |p| (p, i)))
-                .map(|(p, i)| (p - points[i]).norm())
-                .collect()
-        };
-        let gap = worst(&distances(&found), &distances(&expected));
-        assert!(gap < 1e-9 * size, "{degrees}: {gap}");
+        for kind in [SpaceKind::Lric, SpaceKind::Patch] {
+            let space = space(kind, roll.connectivity(), &flat_strip, &frames);
+            let z = encode_all(&*space, &frames).unwrap();
+            let half: Vec<f64> = (0..z.nrows())
+                .map(|a| 0.5 * (z[(a, 0)] + z[(a, 1)]))
+                .collect();
+            let mut found = vec![0.0; flat_strip.len()];
+            space.decode(&half, &mut found).unwrap();
+            let expected = flat(&roll_strip(angle / 2.0, &SMALL));
+            // Up to a rigid motion: compare distances of all vertices from a few.
+            let distances = |x: &[f64]| -> Vec<f64> {
+                let points: Vec<Vector3<f64>> =
+                    x.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
+                let picks = [0, points.len() / 3, points.len() / 2, points.len() - 1];
+                picks
+                    .iter()
+                    .flat_map(|&i| points.iter().map(move |p| (p, i)))
+                    .map(|(p, i)| (p - points[i]).norm())
+                    .collect()
+            };
+            let gap = worst(&distances(&found), &distances(&expected));
+            assert!(gap < 1e-11 * size, "{kind} {degrees}: {gap}");
+        }
     }
 }
 
@@ -220,7 +228,7 @@ fn lric_rolls_by_half() {
 fn what_does_not_fit_is_refused() {
     let (faces, reference) = odd();
     for kind in KINDS {
-        let space = space(kind, 10, &faces, &reference);
+        let space = space(kind, &mesh(10, &faces), &reference, &[]);
         let mut z = vec![0.0; space.dimension()];
         assert!(space.encode(&reference[3..], &mut z).is_err());
         assert!(space.encode(&reference, &mut z[1..]).is_err());

@@ -1,6 +1,6 @@
 //! k, l and m from a tolerance (section 3.4).
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use faer::MatRef;
 
@@ -25,6 +25,18 @@ pub fn fit_to_error(
     layout: Layout,
     pins: &[Pin],
 ) -> Result<Fit, FitError> {
+    check(frames, most, layout, pins)?;
+    let start = Instant::now();
+    let whole = shape_signal(frames, frames.ncols() - 1)?;
+    choose(frames, &whole, start.elapsed(), most, rule, layout, pins)
+}
+
+pub(super) fn check(
+    frames: MatRef<'_, f64>,
+    most: f64,
+    layout: Layout,
+    pins: &[Pin],
+) -> Result<(), FitError> {
     let n = frames.ncols();
     if n < FEWEST_FRAMES {
         return Err(FitError::TooFewFrames { found: n });
@@ -32,19 +44,28 @@ pub fn fit_to_error(
     if most.is_nan() || most <= 0.0 {
         return Err(FitError::BadTolerance { value: most });
     }
-    validate_pins(pins, n)?;
     layout.check()?;
-    let start = Instant::now();
-    let whole = shape_signal(frames, n - 1)?;
-    let h_time = start.elapsed();
+    Ok(validate_pins(pins, n)?)
+}
+
+/// [`fit_to_error`], given the shape signal of all dimensions and the time it took.
+pub(super) fn choose(
+    frames: MatRef<'_, f64>,
+    whole: &ShapeSignal,
+    h_time: Duration,
+    most: f64,
+    rule: KnotRule,
+    layout: Layout,
+    pins: &[Pin],
+) -> Result<Fit, FitError> {
     let mut dimensions: Vec<usize> = SHARES
         .iter()
-        .map(|share| least_m(&whole, share * most))
+        .map(|share| least_m(whole, share * most))
         .collect();
     dimensions.dedup();
     let mut best: Option<(usize, Fit)> = None;
     for m in dimensions.into_iter().rev() {
-        let shape = leading(&whole, m);
+        let shape = leading(whole, m);
         let error = error_h(frames, &shape);
         let mut base = Base::from_shape(shape, error, h_time, layout, pins)?;
         base.settle(rule)?;
@@ -59,14 +80,15 @@ pub fn fit_to_error(
     match best {
         Some((_, fit)) => Ok(fit),
         None => {
-            let error = error_h(frames, &whole);
-            Base::from_shape(whole, error, h_time, layout, pins)?.fit(n + 2, n, rule)
+            let n = frames.ncols();
+            let error = error_h(frames, whole);
+            Base::from_shape(whole.clone(), error, h_time, layout, pins)?.fit(n + 2, n, rule)
         }
     }
 }
 
 /// The least m whose discarded singular values leave at most this error (3).
-fn least_m(shape: &ShapeSignal, most: f64) -> usize {
+pub(super) fn least_m(shape: &ShapeSignal, most: f64) -> usize {
     let rank = shape.basis.ncols();
     let mut left = 0.0;
     for m in (0..rank).rev() {
@@ -79,7 +101,7 @@ fn least_m(shape: &ShapeSignal, most: f64) -> usize {
 }
 
 /// The first m dimensions of a shape signal.
-fn leading(shape: &ShapeSignal, m: usize) -> ShapeSignal {
+pub(super) fn leading(shape: &ShapeSignal, m: usize) -> ShapeSignal {
     ShapeSignal {
         offset: shape.offset.clone(),
         basis: shape.basis.get(.., ..m).to_owned(),

@@ -12,6 +12,7 @@
 //! | `p` | (n, 2) | pose-space positions of the frames |
 //! | `F` | (F, 3) | triangles, 0-based |
 //! | `reference` | (V, 3) | the shape space's reference frame; not in vertex space |
+//! | `patches` | (F) | the patch of each triangle, -1 for degenerate ones; in the space of patches |
 //! | `meta` | text | JSON: `format`, `space` |
 
 use std::path::Path;
@@ -31,6 +32,8 @@ use crate::sequence::format::{FormatError, npz};
 use crate::shape::reference::check_len;
 use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare};
 
+/// Frames whose vectors in the shape space are held at a time, for they are several times as long as positions.
+const AT_A_TIME: usize = 32;
 const FORMAT: &str = "meshseq signal 1";
 
 /// A representation and the mesh it deforms.
@@ -44,6 +47,8 @@ pub struct Stored {
     pub space: SpaceKind,
     /// The shape space's reference frame, 3V positions; empty in vertex space.
     pub reference: Vec<f64>,
+    /// The patch of each triangle, see [`crate::shape::patches::choose`]; empty in spaces without patches.
+    pub patches: Vec<i64>,
 }
 
 impl Stored {
@@ -53,11 +58,17 @@ impl Stored {
         if self.space == SpaceKind::Vertex {
             return Ok(self.representation.evaluate(times));
         }
-        sample_in_space(&*self.prepare()?, &self.representation, times)
+        let space = self.prepare()?;
+        let mut frames = Vec::with_capacity(times.len() * space.frame_len());
+        for some in times.chunks(AT_A_TIME) {
+            frames.extend(sample_in_space(&*space, &self.representation, some)?);
+        }
+        Ok(frames)
     }
 
     fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {
-        let space = prepare(self.space, self.connectivity.clone(), &self.reference)?;
+        let connectivity = self.connectivity.clone();
+        let space = prepare(self.space, connectivity, &self.reference, &self.patches)?;
         check_len(
             "representation",
             &self.representation.offset,
@@ -111,6 +122,9 @@ pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
         let data = stored.reference.clone();
         arrays.push(("reference", Array::F64 { shape, data }));
     }
+    if stored.space == SpaceKind::Patch {
+        arrays.push(("patches", Array::integers(&stored.patches)));
+    }
     Ok(npz::write_arrays(path, &arrays)?)
 }
 
@@ -153,6 +167,10 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         SpaceKind::Vertex => Vec::new(),
         _ => bundle.f64("reference", 2).map_err(arrays)?.1.to_vec(),
     };
+    let patches = match space {
+        SpaceKind::Patch => bundle.integers("patches").map_err(arrays)?.to_vec(),
+        _ => Vec::new(),
+    };
     let numbers = match space {
         SpaceKind::Vertex => representation.dimension(),
         _ => reference.len(),
@@ -172,6 +190,7 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         connectivity: Arc::new(connectivity),
         space,
         reference,
+        patches,
     })
 }
 
@@ -243,4 +262,54 @@ fn foreign(meta: &str) -> Result<SpaceKind, String> {
     let name = meta["space"].as_str().unwrap_or_default();
     name.parse()
         .map_err(|unknown: UnknownSpace| format!("`meta`: {unknown}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::dataset::open;
+    use crate::shape::patches;
+    use crate::signal::fit::FitOptions;
+    use crate::signal::in_space::fit_in_space;
+
+    #[test]
+    fn patches_are_stored_and_needed() {
+        let sequence = open("@gallop-small").unwrap();
+        let n = sequence.frame_count();
+        let mesh = sequence.connectivity().clone();
+        let labels = patches::choose(mesh.clone(), sequence.frame(0), sequence.positions());
+        let labels = labels.unwrap();
+        assert!(labels.contains(&1));
+        let space = prepare(SpaceKind::Patch, mesh.clone(), sequence.frame(0), &labels);
+        let options = FitOptions::new(n + 2, n, n - 1);
+        let fit = fit_in_space(&*space.unwrap(), sequence.positions(), &options).unwrap();
+        assert!(fit.rms < 1e-9, "{}", fit.rms);
+        let mut stored = Stored {
+            representation: fit.fit.representation,
+            positions: fit.fit.positions,
+            connectivity: mesh,
+            space: SpaceKind::Patch,
+            reference: sequence.frame(0).to_vec(),
+            patches: labels,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("patches.npz");
+        save(&stored, &path).unwrap();
+        let loaded = load(&path).unwrap();
+        assert_eq!(loaded, stored);
+        let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+        let frames = loaded.sample(&times).unwrap();
+        let gaps = frames.iter().zip(sequence.positions());
+        let worst = gaps.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-8, "{worst}");
+        // One patch less is another space, no patches are none.
+        stored.patches.iter_mut().for_each(|p| *p = 0);
+        let refused = stored.sample(&times);
+        assert!(
+            matches!(refused, Err(ShapeError::WrongLength { .. })),
+            "{refused:?}"
+        );
+        stored.patches.clear();
+        assert!(matches!(stored.sample(&times), Err(ShapeError::Patch(_))));
+    }
 }

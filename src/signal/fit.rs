@@ -13,7 +13,8 @@ use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
 use super::layout::{Distances, Layout, LayoutError};
-use super::parameters::{centripetal, distinct};
+use super::mds::Steps;
+use super::parameters::{Grid, centripetal, distinct};
 use super::pins::{Pin, PinError, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
@@ -46,6 +47,20 @@ pub struct FitOptions {
     pub layout: Layout,
     /// Pose-space positions that the user fixes.
     pub pins: Vec<Pin>,
+}
+
+impl FitOptions {
+    /// These constants, the default knot rule and layout, no pins.
+    pub fn new(k: usize, l: usize, m: usize) -> Self {
+        Self {
+            k,
+            l,
+            m,
+            knots: KnotRule::default(),
+            layout: Layout::default(),
+            pins: Vec::new(),
+        }
+    }
 }
 
 /// Why there is no fit.
@@ -123,6 +138,8 @@ pub struct Fit {
     pub representation: Representation,
     /// p_1 .. p_n.
     pub positions: Vec<Point>,
+    /// How many steps the scaling took.
+    pub steps: Steps,
     /// X, m x n.
     pub coordinates: Mat<f64>,
     /// Singular values of the centred frames.
@@ -166,51 +183,60 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 /// g(f(i + 1/2)) from the natural cubic spline through the x_i: frames alone do not tell what lies between them, and of smooth curves that one
 /// bends least. Costs as many fits as there are weights, with one h.
 pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitError> {
-    check_ranges(frames.ncols(), options)?;
-    validate_pins(&options.pins, frames.ncols())?;
+    let n = frames.ncols();
+    let most_m = n.saturating_sub(1);
+    check_ranges(
+        n,
+        &[
+            ("k", options.k, 4, n + 2),
+            ("l", options.l, 3, n),
+            ("m", options.m, 0, most_m),
+        ],
+    )?;
+    validate_pins(&options.pins, n)?;
     options.layout.check()?;
     let base = Base::new(frames, options.m, options.layout, &options.pins)?;
     base.fit(options.k, options.l, options.knots)
 }
 
-fn check_ranges(n: usize, options: &FitOptions) -> Result<(), FitError> {
-    if n < FEWEST_FRAMES {
-        return Err(FitError::TooFewFrames { found: n });
+/// An error unless there are enough frames and each constant, by name, lies between its least and its greatest value.
+pub(super) fn check_ranges(
+    frames: usize,
+    ranges: &[(&'static str, usize, usize, usize)],
+) -> Result<(), FitError> {
+    if frames < FEWEST_FRAMES {
+        return Err(FitError::TooFewFrames { found: frames });
     }
-    let ranges = [
-        ("k", options.k, 4, n + 2),
-        ("l", options.l, 3, n),
-        ("m", options.m, 0, n - 1),
-    ];
-    for (name, value, low, high) in ranges {
-        if value < low || value > high {
-            return Err(FitError::OutOfRange {
-                name,
-                value,
-                low,
-                high,
-                frames: n,
-            });
-        }
+    let outside = |&&(_, value, low, high): &&(_, usize, usize, usize)| value < low || value > high;
+    match ranges.iter().find(outside) {
+        None => Ok(()),
+        Some(&(name, value, low, high)) => Err(FitError::OutOfRange {
+            name,
+            value,
+            low,
+            high,
+            frames,
+        }),
     }
-    Ok(())
 }
 
 /// Positions of one weight of the layout, and what follows from them alone.
 struct Plane {
     weight: f64,
     positions: Vec<Point>,
+    steps: Steps,
     diameter: f64,
     parameters: Vec<f64>,
 }
 
 impl Plane {
-    fn new(weight: f64, positions: Vec<Point>) -> Self {
+    fn new(weight: f64, positions: Vec<Point>, steps: Steps) -> Self {
         let diameter = diameter(&positions);
         Self {
             parameters: frame_parameters(&positions, diameter),
             weight,
             positions,
+            steps,
             diameter,
         }
     }
@@ -253,7 +279,8 @@ impl Base {
         let (planes, mds) = timed(|| {
             let distances = Distances::new(x);
             let plane = |weight| -> Result<Plane, FactorError> {
-                Ok(Plane::new(weight, distances.positions(x, weight, pins)?))
+                let (positions, steps) = distances.positions(x, weight, pins)?;
+                Ok(Plane::new(weight, positions, steps))
             };
             let weights = layout.weights().into_par_iter();
             weights.map(plane).collect::<Result<Vec<_>, _>>()
@@ -323,6 +350,11 @@ impl Base {
         let time = TimeSignal::new(attempt.spline.clone(), parameters.clone());
         let times: Vec<f64> = (1..parameters.len()).map(|i| i as f64 + 0.5).collect();
         attempt.pose.evaluate(&time.evaluate_all(&times))
+    }
+
+    /// t_1 .. t_n.
+    pub(super) fn parameters(&self) -> &[f64] {
+        &self.plane().parameters
     }
 
     /// m.
@@ -435,7 +467,9 @@ impl Base {
     fn spline(&self, k: usize, rule: KnotRule) -> Result<(Spline, Vec<Point>), FitError> {
         let plane = self.plane();
         let t = distinct(&plane.parameters);
-        let u = knots(&t, k.min(t.len() + 2), rule)?;
+        let mut u = knots(&t, k.min(t.len() + 2), rule)?;
+        let grid = Grid::new(t[t.len() - 1]);
+        u.iter_mut().for_each(|u| *u = grid.round(*u));
         let fitted = Spline::fit_with_values(&plane.parameters, &plane.positions, &u)?;
         Ok(fitted)
     }
@@ -450,6 +484,7 @@ impl Base {
                 basis: self.shape.basis,
             },
             positions: plane.positions,
+            steps: plane.steps,
             layout_weight: plane.weight,
             coordinates: self.shape.coordinates,
             singular_values: self.shape.singular_values,
@@ -463,8 +498,8 @@ impl Base {
 
 /// Signals for one choice of k and sites.
 pub(super) struct Attempt {
-    pose: PoseSignal,
-    spline: Spline,
+    pub(super) pose: PoseSignal,
+    pub(super) spline: Spline,
     pub(super) errors: Errors,
     pub(super) sites: SiteOrder,
     same_pose: f64,
@@ -480,7 +515,9 @@ fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
             still[i] = still[i - 1];
         }
     }
-    let t = centripetal(&still);
+    let mut t = centripetal(&still);
+    let grid = Grid::new(t.last().copied().unwrap_or(0.0));
+    t.iter_mut().for_each(|t| *t = grid.round(*t));
     if distinct(&t).len() > 1 {
         t
     } else {
@@ -519,12 +556,9 @@ mod tests {
 
     fn options(k: usize, l: usize, m: usize) -> FitOptions {
         FitOptions {
-            k,
-            l,
-            m,
             knots: KnotRule::Literal,
             layout: Layout::Mds,
-            pins: Vec::new(),
+            ..FitOptions::new(k, l, m)
         }
     }
 

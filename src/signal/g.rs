@@ -12,6 +12,11 @@ use crate::linalg::kernels::{axpy, combine};
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
 
+/// Points evaluated together.
+const TOGETHER: usize = 32;
+/// Columns of coefficients taken at a time then; a multiple of the four that [`combine`] takes, so that sums keep their order.
+const COLUMNS: usize = 32;
+
 /// g(p) = g_0 + sum_j phi(||s_j - p||) g_j + G p, with phi(r) = r^2 ln r, in the units of the pose-space positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseSignal {
@@ -56,30 +61,14 @@ impl PoseSignal {
         let frame = Frame::new(&chosen);
         let normalised: Vec<Point> = chosen.iter().map(|&p| frame.normalise(p)).collect();
         check_apart(&normalised)?;
-        let (l, affine) = (chosen.len(), frame.affine);
-        let columns = |q: Point| [1.0, q[0], q[1]];
-        let side = Qr::new(Mat::from_fn(l, affine, |j, a| columns(normalised[j])[a]));
         let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
-        let mut bends = Mat::zeros(l, points.len());
-        for (i, &q) in queries.iter().enumerate() {
-            kernels(q, &normalised, bends.col_as_slice_mut(i));
-        }
-        side.apply_transpose(&mut bends);
-        let system = Mat::from_fn(points.len(), l, |i, j| {
-            if j < affine {
-                columns(queries[i])[j]
-            } else {
-                bends[(j, i)]
-            }
-        });
+        let design = Design::new(&normalised, frame.affine, &queries);
         let mut right = coordinates.transpose().to_owned();
-        let qr = Qr::new(system);
+        let qr = Qr::new(design.matrix(&queries));
         qr.apply_transpose(&mut right);
         let solution = qr.solve_upper(&right);
-        let mut weights = Mat::from_fn(l, coordinates.nrows(), |j, a| {
-            if j < affine { 0.0 } else { solution[(j, a)] }
-        });
-        side.apply(&mut weights);
+        let weights = design.kernel_weights(&solution);
+        let affine = frame.affine;
         let affine_part = solution.get(..affine, ..);
         Ok(Self {
             coefficients: in_given_units(&frame, &normalised, &weights, affine_part),
@@ -103,18 +92,91 @@ impl PoseSignal {
         axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
     }
 
-    /// g at many points, m x q.
+    /// g at many points, m x q, with the same bits as one by one.
     pub fn evaluate(&self, points: &[Point]) -> Mat<f64> {
         let m = self.coefficients.nrows();
         let mut values = vec![0.0; m * points.len()];
         if m > 0 {
             values
-                .par_chunks_mut(m)
-                .zip(points)
-                .with_min_len(16)
-                .for_each(|(x, &p)| self.evaluate_into(p, x));
+                .par_chunks_mut(m * TOGETHER)
+                .zip(points.par_chunks(TOGETHER))
+                .for_each(|(x, points)| self.evaluate_together(points, x));
         }
         MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
+    }
+
+    /// g at a few points, m numbers each: the coefficients go through the cache once for all of them.
+    fn evaluate_together(&self, points: &[Point], values: &mut [f64]) {
+        let (l, m) = (self.sites.len(), self.coefficients.nrows());
+        let mut bends = vec![0.0; l * points.len()];
+        for (i, (x, &p)) in values.chunks_exact_mut(m).zip(points).enumerate() {
+            kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
+            x.copy_from_slice(self.coefficients.col_as_slice(0));
+        }
+        for first in (0..l).step_by(COLUMNS) {
+            let last = (first + COLUMNS).min(l);
+            let column = |j: usize| self.coefficients.col_as_slice(first + j + 1);
+            for (i, x) in values.chunks_exact_mut(m).enumerate() {
+                combine(&bends[i * l + first..i * l + last], column, x);
+            }
+        }
+        for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
+            axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
+            axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
+        }
+    }
+}
+
+/// The functions of the pose plane that meet the side conditions, for l sites that span an affine space of functions of dimension `affine`: 1, x
+/// and y of it, and l - affine sums of kernels. Sites and points are in the coordinates of a [`Frame`].
+pub(super) struct Design {
+    /// Of the l x affine matrix [1 s].
+    pub side: Qr,
+    /// The kernels (a site a row, a point a column) after Q^T of `side`: below the first `affine` rows are the sums that meet the conditions.
+    pub bends: Mat<f64>,
+    pub affine: usize,
+}
+
+impl Design {
+    /// O(l points) kernels.
+    pub fn new(sites: &[Point], affine: usize, points: &[Point]) -> Self {
+        let side = Qr::new(Mat::from_fn(sites.len(), affine, |j, a| {
+            [1.0, sites[j][0], sites[j][1]][a]
+        }));
+        let mut bends = Mat::zeros(sites.len(), points.len());
+        for (i, &q) in points.iter().enumerate() {
+            kernels(q, sites, bends.col_as_slice_mut(i));
+        }
+        side.apply_transpose(&mut bends);
+        Self {
+            side,
+            bends,
+            affine,
+        }
+    }
+
+    /// The functions at the points, one a column.
+    pub fn matrix(&self, points: &[Point]) -> Mat<f64> {
+        Mat::from_fn(points.len(), self.bends.nrows(), |i, j| {
+            if j < self.affine {
+                [1.0, points[i][0], points[i][1]][j]
+            } else {
+                self.bends[(j, i)]
+            }
+        })
+    }
+
+    /// The weights of the l kernels, one a row, from the coefficients of the functions.
+    pub fn kernel_weights(&self, solution: &Mat<f64>) -> Mat<f64> {
+        let mut weights = Mat::from_fn(solution.nrows(), solution.ncols(), |j, a| {
+            if j < self.affine {
+                0.0
+            } else {
+                solution[(j, a)]
+            }
+        });
+        self.side.apply(&mut weights);
+        weights
     }
 }
 
@@ -154,7 +216,7 @@ fn check_apart(normalised: &[Point]) -> Result<(), PoseError> {
 
 /// Coefficients in the units of the points: with q = (p - c) / s, phi(r / s) = (phi(r) - r^2 ln s) / s^2, and the side conditions turn
 /// sum_j c_j ||p - s_j||^2 into the constant sum_j c_j ||s_j - c||^2.
-fn in_given_units(
+pub(super) fn in_given_units(
     frame: &Frame,
     normalised: &[Point],
     weights: &Mat<f64>,
@@ -221,6 +283,23 @@ mod tests {
             assert!(sum(&|j| p[j][0]).abs() < 1e-12 * size * 100.0);
             assert!(sum(&|j| p[j][1]).abs() < 1e-12 * size * 100.0);
         }
+    }
+
+    #[test]
+    fn many_points_have_the_bits_of_each_by_itself() {
+        let (p, x) = (points(90), shapes(90));
+        let g = PoseSignal::fit(&p, x.as_ref(), &(0..70).collect::<Vec<_>>()).unwrap();
+        let all = g.evaluate(&p);
+        let mut one = [0.0; 3];
+        for (i, &p) in p.iter().enumerate() {
+            g.evaluate_into(p, &mut one);
+            assert_eq!(one[..], *all.col_as_slice(i));
+        }
+        let none = PoseSignal {
+            sites: Vec::new(),
+            coefficients: Mat::ones(2, 3),
+        };
+        assert_eq!(none.evaluate(&[[2.0, 3.0]]), Mat::full(2, 1, 6.0));
     }
 
     #[test]

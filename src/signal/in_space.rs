@@ -10,6 +10,8 @@ use super::knots::KnotRule;
 use super::layout::Layout;
 use super::pins::Pin;
 use super::psi::Representation;
+use super::refine::tolerance::fit_to_error_refined;
+use super::refine::{RefineOptions, Refinement, refine};
 use crate::shape::{ShapeError, Space, decode_all, encode_all};
 
 /// Fits tried until the vertices are near enough.
@@ -48,6 +50,19 @@ pub fn fit_in_space(
     Ok(SpaceFit { fit, rms })
 }
 
+/// Refines a fit to these frames. (2) in S does not rise; what that makes of the vertices is measured.
+pub fn refine_in_space(
+    space: &dyn Space,
+    frames: &[f64],
+    found: SpaceFit,
+    options: &RefineOptions,
+) -> Result<(SpaceFit, Refinement), SpaceFitError> {
+    let z = encode_all(space, frames)?;
+    let (fit, refinement) = refine(z.as_ref(), found.fit, options)?;
+    let rms = rms_after_decoding(space, frames, &fit.representation)?;
+    Ok((SpaceFit { fit, rms }, refinement))
+}
+
 /// Chooses k, l and m (section 3.4) so that the vertices are off by at most `rms` after decoding.
 ///
 /// The allowed error (2) in S starts at the share of the frames' spread in S that `rms` is of their spread in space, and is then moved by what the
@@ -60,33 +75,73 @@ pub fn fit_in_space_to_rms(
     layout: Layout,
     pins: &[Pin],
 ) -> Result<SpaceFit, SpaceFitError> {
+    let staged = |z: MatRef<'_, f64>, most| Ok((fit_to_error(z, most, knots, layout, pins)?, ()));
+    let interpolating = |z: MatRef<'_, f64>| Ok((interpolate(z, knots, layout, pins)?, ()));
+    Ok(to_rms(space, frames, rms, staged, interpolating)?.0)
+}
+
+/// The same with what [`fit_to_error_refined`] chooses.
+pub fn fit_in_space_to_rms_refined(
+    space: &dyn Space,
+    frames: &[f64],
+    rms: f64,
+    knots: KnotRule,
+    layout: Layout,
+    pins: &[Pin],
+    options: &RefineOptions,
+) -> Result<(SpaceFit, Refinement), SpaceFitError> {
+    let refined =
+        |z: MatRef<'_, f64>, most| fit_to_error_refined(z, most, knots, layout, pins, options);
+    let interpolating = |z: MatRef<'_, f64>| {
+        let fit = interpolate(z, knots, layout, pins)?;
+        let untouched = Refinement::none(&fit, options);
+        Ok((fit, untouched))
+    };
+    to_rms(space, frames, rms, refined, interpolating)
+}
+
+fn interpolate(
+    z: MatRef<'_, f64>,
+    knots: KnotRule,
+    layout: Layout,
+    pins: &[Pin],
+) -> Result<Fit, FitError> {
+    let n = z.ncols();
+    let options = FitOptions {
+        knots,
+        layout,
+        pins: pins.to_vec(),
+        ..FitOptions::new(n + 2, n, n - 1)
+    };
+    fit(z, &options)
+}
+
+/// A fit by `to_error`, with the error (2) that the vertices ask for, or the last resort.
+fn to_rms<T>(
+    space: &dyn Space,
+    frames: &[f64],
+    rms: f64,
+    to_error: impl Fn(MatRef<'_, f64>, f64) -> Result<(Fit, T), FitError>,
+    last_resort: impl Fn(MatRef<'_, f64>) -> Result<(Fit, T), FitError>,
+) -> Result<(SpaceFit, T), SpaceFitError> {
     if !(rms > 0.0 && rms.is_finite()) {
         return Err(FitError::BadTolerance { value: rms }.into());
     }
     let z = encode_all(space, frames)?;
-    let n = z.ncols();
-    let given = MatRef::from_column_major_slice(frames, space.frame_len(), n);
+    let given = MatRef::from_column_major_slice(frames, space.frame_len(), z.ncols());
     let allowed = rms * rms * frames.len() as f64 / 3.0;
     let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
     for _ in 0..ATTEMPTS {
-        let fit = fit_to_error(z.as_ref(), most.max(f64::MIN_POSITIVE), knots, layout, pins)?;
+        let (fit, told) = to_error(z.as_ref(), most.max(f64::MIN_POSITIVE))?;
         let found = rms_after_decoding(space, frames, &fit.representation)?;
         if found <= rms {
-            return Ok(SpaceFit { fit, rms: found });
+            return Ok((SpaceFit { fit, rms: found }, told));
         }
         most *= AIM * (rms / found).powi(2);
     }
-    let options = FitOptions {
-        k: n + 2,
-        l: n,
-        m: n - 1,
-        knots,
-        layout,
-        pins: pins.to_vec(),
-    };
-    let fit = fit(z.as_ref(), &options)?;
+    let (fit, told) = last_resort(z.as_ref())?;
     let rms = rms_after_decoding(space, frames, &fit.representation)?;
-    Ok(SpaceFit { fit, rms })
+    Ok((SpaceFit { fit, rms }, told))
 }
 
 /// psi at many times as frames of 3V positions, decoded.
@@ -100,20 +155,32 @@ pub fn sample_in_space(
     decode_all(space, MatRef::from_column_major_slice(&z, d, times.len()))
 }
 
-fn rms_after_decoding(
+/// The mean square distance of the vertices of psi(i), decoded, from those of frame i, of each of the n frames.
+pub fn mean_squares(
+    space: &dyn Space,
+    frames: &[f64],
+    representation: &Representation,
+) -> Result<Vec<f64>, ShapeError> {
+    let n = representation.time.frame_count();
+    let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+    let decoded = sample_in_space(space, representation, &times)?;
+    let len = space.frame_len();
+    let of_frame = |(a, b): (&[f64], &[f64])| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>() / (len as f64 / 3.0)
+    };
+    let pairs = decoded.chunks(len).zip(frames.chunks(len));
+    Ok(pairs.map(of_frame).collect())
+}
+
+/// The root mean square distance of the vertices of all frames.
+pub fn rms_after_decoding(
     space: &dyn Space,
     frames: &[f64],
     representation: &Representation,
 ) -> Result<f64, ShapeError> {
-    let n = representation.time.frame_count();
-    let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let decoded = sample_in_space(space, representation, &times)?;
-    let square: f64 = decoded
-        .iter()
-        .zip(frames)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum();
-    Ok((square / (frames.len() as f64 / 3.0)).sqrt())
+    let each = mean_squares(space, frames, representation)?;
+    Ok((each.iter().sum::<f64>() / each.len() as f64).sqrt())
 }
 
 /// Sum of squared distances of the columns from their mean.
@@ -141,16 +208,10 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
-        let options = FitOptions {
-            k: n + 2,
-            l: n,
-            m: n - 1,
-            knots: KnotRule::Symmetric,
-            layout: Layout::Mds,
-            pins: Vec::new(),
-        };
+        let options = FitOptions::new(n + 2, n, n - 1);
         let found = fit_in_space(&*space, sequence.positions(), &options).unwrap();
         assert!(found.rms < 1e-9, "{}", found.rms);
     }
@@ -162,6 +223,7 @@ mod tests {
             SpaceKind::Gradient,
             sequence.connectivity().clone(),
             sequence.frame(0),
+            &[],
         )
         .unwrap();
         let symmetric = KnotRule::Symmetric;

@@ -17,7 +17,7 @@ use faer::{Mat, MatRef};
 use thiserror::Error;
 
 use super::Point;
-use super::mds::{Dissimilarities, scale};
+use super::mds::{Dissimilarities, Steps, scale_counting};
 use super::pins::{Pin, moved_onto, principal_start};
 use crate::linalg::dense::{FactorError, symmetric_eigen};
 
@@ -39,6 +39,13 @@ pub enum Layout {
     /// Distances between poses mixed with distances along the motion, the latter with this weight, 0 to 1 (0 is `Mds`); the best of [`WEIGHTS`] if not
     /// given, see [`super::fit::fit`].
     Ordered { weight: Option<f64> },
+}
+
+/// `ordered`: its in-betweens are better on every sequence measured, and (2) at the same k, l, m is no worse (reading 14).
+impl Default for Layout {
+    fn default() -> Self {
+        Self::Ordered { weight: None }
+    }
 }
 
 /// A layout that there is not.
@@ -124,7 +131,7 @@ impl Distances {
         if weight == 0.0 {
             return self.poses.clone();
         }
-        let n = self.poses.count();
+        let n = self.poses.len();
         let along = self.along.get_or_init(|| along_the_motion(&self.poses));
         let mix = |i: usize, j: usize| {
             let (d, s) = (self.poses.row(i)[j], along.row(i)[j]);
@@ -138,26 +145,23 @@ impl Distances {
         }
     }
 
-    /// Positions of the frames in the pose plane for this weight, pins held.
+    /// Positions of the frames in the pose plane for this weight, pins held, and the steps that the scaling took.
     ///
     /// Scaling starts from classical scaling of the same dissimilarities, which for weight 0 is the first two principal coordinates (reading 6).
-    /// `coordinates` are those that these distances are of. O(n^3) for classical scaling, then as [`scale`].
+    /// `coordinates` are those that these distances are of. O(n^3) for classical scaling, then as [`super::mds::scale`].
     pub fn positions(
         &self,
         coordinates: MatRef<'_, f64>,
         weight: f64,
         pins: &[Pin],
-    ) -> Result<Vec<Point>, FactorError> {
+    ) -> Result<(Vec<Point>, Steps), FactorError> {
         if weight == 0.0 {
-            return Ok(scale(
-                &self.poses,
-                &principal_start(coordinates, pins),
-                pins,
-            ));
+            let start = principal_start(coordinates, pins);
+            return Ok(scale_counting(&self.poses, &start, pins));
         }
         let delta = self.mixed(weight);
         let start = moved_onto(classical_scaling(&delta)?, pins);
-        Ok(scale(&delta, &start, pins))
+        Ok(scale_counting(&delta, &start, pins))
     }
 }
 
@@ -167,7 +171,7 @@ impl Distances {
 /// that fast stretches do not crowd out slow ones and held poses stay one. A frame that repeats another stretch, which is one within 0.05 of a
 /// step of the segment between two others, is joined to both ends of that step by its shares of it. gamma_ij is the shortest path.
 pub fn along_the_motion(poses: &Dissimilarities) -> Dissimilarities {
-    let n = poses.count();
+    let n = poses.len();
     let negligible = HELD * poses.greatest();
     let step = |i: usize| match poses.row(i)[i + 1] {
         s if s <= negligible => 0.0,
@@ -218,7 +222,7 @@ fn repeats(poses: &Dissimilarities, steps: &[f64], negligible: f64) -> Vec<Repea
         before.max(steps.get(i).copied().unwrap_or(0.0))
     };
     let mut found = Vec::new();
-    for frame in 0..poses.count() {
+    for frame in 0..poses.len() {
         let row = poses.row(frame);
         for (step, &length) in steps.iter().enumerate() {
             if frame == step || frame == step + 1 {
@@ -287,7 +291,7 @@ fn shortest_paths(joined: &[Vec<(usize, f64)>], from: usize) -> Vec<f64> {
 /// Classical scaling (Torgerson 1952): the first two eigenvectors of -J delta^2 J / 2, J removing means, times the roots of their eigenvalues. The
 /// entry of largest magnitude of each is positive; what is no positive eigenvalue, or rounding, gives 0. O(n^3).
 fn classical_scaling(delta: &Dissimilarities) -> Result<Vec<Point>, FactorError> {
-    let n = delta.count();
+    let n = delta.len();
     let square = |i: usize, j: usize| delta.row(i)[j].powi(2);
     let means: Vec<f64> = (0..n)
         .map(|i| (0..n).map(|j| square(i, j)).sum::<f64>() / n as f64)
@@ -370,7 +374,7 @@ mod tests {
         assert!((gamma.row(0)[39] / gamma.row(0)[1] - 39.0).abs() < 1e-9);
         let distances = Distances::new(x.as_ref());
         let gap = |weight: f64| {
-            let p = distances.positions(x.as_ref(), weight, &[]).unwrap();
+            let p = distances.positions(x.as_ref(), weight, &[]).unwrap().0;
             let size = super::super::poses::diameter(&p);
             let pairs = (0..40usize).flat_map(|i| (0..i.saturating_sub(5)).map(move |j| (i, j)));
             pairs
@@ -390,14 +394,16 @@ mod tests {
         let line = curve(9, |t| [t, 2.0 * t, -t]);
         let p = Distances::new(line.as_ref())
             .positions(line.as_ref(), 0.7, &[])
-            .unwrap();
+            .unwrap()
+            .0;
         let step = super::super::distance(p[0], p[1]);
         assert!((step - 6f64.sqrt()).abs() < 1e-9);
         assert!((super::super::distance(p[0], p[8]) - 8.0 * step).abs() < 1e-9);
         let point = curve(5, |_| [1.0; 3]);
         let p = Distances::new(point.as_ref())
             .positions(point.as_ref(), 0.7, &[])
-            .unwrap();
+            .unwrap()
+            .0;
         assert_eq!(p, [[0.0; 2]; 5]);
     }
 
@@ -410,7 +416,8 @@ mod tests {
         };
         let p = Distances::new(x.as_ref())
             .positions(x.as_ref(), 0.5, &[pin])
-            .unwrap();
+            .unwrap()
+            .0;
         assert_eq!(p[7], pin.position);
     }
 

@@ -9,20 +9,46 @@ use super::fit::{Errors, Fit, FitError, FitOptions, fit};
 use super::in_space::SpaceFitError;
 use super::knots::KnotRule;
 use super::layout::Layout;
+use super::refine::{RefineOptions, refine};
 use crate::shape::{ShapeError, Space, decode_all, encode_all};
 
 /// Four frames are kept of seven.
 pub const FEWEST_FRAMES: usize = 7;
 
-/// Every second frame of a sequence, in a shape space, and the frames between them that are to be predicted.
-///
-/// Of n frames the 1st, 3rd, 5th ... are kept, and the 2nd, 4th ... left out; a last frame that would lie beyond the kept ones is dropped.
+/// The frames of a sequence, 3V numbers each, in two: of n frames the 1st, 3rd, 5th ... are kept, and the 2nd, 4th ... left out; a last frame that would
+/// lie beyond the kept ones is dropped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    pub kept: Vec<f64>,
+    pub left_out: Vec<f64>,
+}
+
+impl Split {
+    /// Splits frames of `len` numbers each.
+    pub fn new(frames: &[f64], len: usize) -> Result<Self, LeaveOutError> {
+        let len = len.max(1);
+        let found = frames.len() / len;
+        if found < FEWEST_FRAMES {
+            return Err(LeaveOutError::TooFewFrames { found });
+        }
+        let odd = found - 1 + found % 2;
+        let every_second = |first: usize| -> Vec<f64> {
+            let chosen = frames.chunks_exact(len).take(odd).skip(first).step_by(2);
+            chosen.flatten().copied().collect()
+        };
+        Ok(Self {
+            kept: every_second(0),
+            left_out: every_second(1),
+        })
+    }
+}
+
+/// The kept frames in a shape space, and those that are to be predicted.
 pub struct LeaveOut<'a> {
     space: &'a dyn Space,
     /// z of the kept frames, d x kept.
     kept: Mat<f64>,
-    /// Positions of the frames left out, 3V numbers each.
-    left_out: Vec<f64>,
+    left_out: &'a [f64],
 }
 
 /// How far predictions are from the frames left out.
@@ -75,21 +101,11 @@ impl From<FitError> for LeaveOutError {
 }
 
 impl<'a> LeaveOut<'a> {
-    /// Splits `frames` (n of 3V positions each) and encodes the kept ones.
-    pub fn new(space: &'a dyn Space, frames: &[f64]) -> Result<Self, LeaveOutError> {
-        let len = space.frame_len().max(1);
-        let found = frames.len() / len;
-        if found < FEWEST_FRAMES {
-            return Err(LeaveOutError::TooFewFrames { found });
-        }
-        let odd = found - 1 + found % 2;
-        let every_second = |first: usize| -> Vec<f64> {
-            let chosen = frames.chunks_exact(len).take(odd).skip(first).step_by(2);
-            chosen.flatten().copied().collect()
-        };
+    /// Encodes the kept frames. A space whose patches are chosen by frames should know the kept ones alone.
+    pub fn new(space: &'a dyn Space, split: &'a Split) -> Result<Self, LeaveOutError> {
         Ok(Self {
-            kept: encode_all(space, &every_second(0))?,
-            left_out: every_second(1),
+            kept: encode_all(space, &split.kept)?,
+            left_out: &split.left_out,
             space,
         })
     }
@@ -122,12 +138,9 @@ impl<'a> LeaveOut<'a> {
             false => (part(4), part(3)),
         };
         FitOptions {
-            k,
-            l,
-            m: n - 1,
             knots,
             layout,
-            pins: Vec::new(),
+            ..FitOptions::new(k, l, n - 1)
         }
     }
 
@@ -137,9 +150,11 @@ impl<'a> LeaveOut<'a> {
         shares: &[f64],
         layout: Layout,
         knots: KnotRule,
+        refinement: Option<&RefineOptions>,
     ) -> Result<Vec<TradeOff>, LeaveOutError> {
         let at = |&share: &f64| {
-            let (missed, fit) = self.signals(&self.options(share, layout, knots))?;
+            let options = self.options(share, layout, knots);
+            let (missed, fit) = self.signals(&options, refinement)?;
             Ok(TradeOff {
                 share,
                 klm: fit.klm(),
@@ -151,17 +166,21 @@ impl<'a> LeaveOut<'a> {
         shares.iter().map(at).collect()
     }
 
-    /// By signals that are fitted to the kept frames.
-    pub fn signals(&self, options: &FitOptions) -> Result<(Missed, Fit), LeaveOutError> {
-        let fit = fit(self.kept.as_ref(), options)?;
-        let times: Vec<f64> = (1..self.kept()).map(|i| i as f64 + 0.5).collect();
+    /// By signals that are fitted to the kept frames, and then refined if asked to.
+    pub fn signals(
+        &self,
+        options: &FitOptions,
+        refinement: Option<&RefineOptions>,
+    ) -> Result<(Missed, Fit), LeaveOutError> {
+        let kept = self.kept.as_ref();
+        let mut fit = fit(kept, options)?;
+        if let Some(how) = refinement {
+            fit = refine(kept, fit, how)?.0;
+        }
+        let times: Vec<f64> = (1..kept.ncols()).map(|i| i as f64 + 0.5).collect();
         let z = fit.representation.evaluate(&times);
-        let missed = self.missed(MatRef::from_column_major_slice(
-            &z,
-            self.kept.nrows(),
-            times.len(),
-        ))?;
-        Ok((missed, fit))
+        let z = MatRef::from_column_major_slice(&z, kept.nrows(), times.len());
+        Ok((self.missed(z)?, fit))
     }
 
     /// How far the frames of these z (d x frames left out) are from the frames left out.
@@ -188,7 +207,7 @@ mod tests {
     use super::*;
     use crate::sequence::dataset::open;
     use crate::shape::vertex::VertexSpace;
-    use crate::shape::{SpaceKind, prepare};
+    use crate::shape::{SpaceKind, prepare_for};
 
     /// One vertex on the curve (t, t^2, 0) at t = 0, 1, 2 ...
     fn parabola(n: usize) -> Vec<f64> {
@@ -201,7 +220,8 @@ mod tests {
     fn means_of_neighbours_miss_a_parabola_by_one() {
         let space = VertexSpace::new(1);
         for n in [9, 10] {
-            let test = LeaveOut::new(&space, &parabola(n)).unwrap();
+            let split = Split::new(&parabola(n), 3).unwrap();
+            let test = LeaveOut::new(&space, &split).unwrap();
             assert_eq!(test.kept(), 5);
             let missed = test.linear().unwrap();
             assert_eq!(missed.each, [1.0; 4]);
@@ -216,9 +236,10 @@ mod tests {
             .flat_map(|i| [i as f64, 2.0 * i as f64, -1.0])
             .collect();
         let space = VertexSpace::new(1);
-        let test = LeaveOut::new(&space, &frames).unwrap();
+        let split = Split::new(&frames, 3).unwrap();
+        let test = LeaveOut::new(&space, &split).unwrap();
         let options = test.options(1.0, Layout::Mds, KnotRule::Symmetric);
-        let (missed, _) = test.signals(&options).unwrap();
+        let (missed, _) = test.signals(&options, None).unwrap();
         for missed in [missed, test.linear().unwrap(), test.cubic().unwrap()] {
             assert!(missed.rms < 1e-12, "{missed:?}");
         }
@@ -228,9 +249,9 @@ mod tests {
     fn spaces_decode_before_anything_is_measured() {
         let sequence = open("@gallop-small").unwrap();
         let of = |kind| {
-            let connectivity = sequence.connectivity().clone();
-            let space = prepare(kind, connectivity, sequence.frame(0)).unwrap();
-            let test = LeaveOut::new(&*space, sequence.positions()).unwrap();
+            let split = Split::new(sequence.positions(), sequence.dimension()).unwrap();
+            let space = prepare_for(kind, sequence.connectivity(), &split.kept).unwrap();
+            let test = LeaveOut::new(&*space, &split).unwrap();
             (test.linear().unwrap().rms, test.cubic().unwrap().rms)
         };
         let (vertex, gradient) = (of(SpaceKind::Vertex), of(SpaceKind::Gradient));
@@ -242,9 +263,10 @@ mod tests {
     fn order_keeps_in_betweens_that_plain_scaling_spoils() {
         let sequence = open("@jelly-small").unwrap();
         let space = VertexSpace::new(sequence.connectivity().vertex_count());
-        let test = LeaveOut::new(&space, sequence.positions()).unwrap();
+        let split = Split::new(sequence.positions(), sequence.dimension()).unwrap();
+        let test = LeaveOut::new(&space, &split).unwrap();
         let rows = |layout| {
-            test.trade_off(&[1.0, 0.8], layout, KnotRule::Symmetric)
+            test.trade_off(&[1.0, 0.8], layout, KnotRule::Symmetric, None)
                 .unwrap()
         };
         let linear = test.linear().unwrap().rms;
@@ -258,9 +280,8 @@ mod tests {
 
     #[test]
     fn short_sequences_are_refused() {
-        let space = VertexSpace::new(1);
         assert!(matches!(
-            LeaveOut::new(&space, &parabola(6)),
+            Split::new(&parabola(6), 3),
             Err(LeaveOutError::TooFewFrames { found: 6 })
         ));
     }

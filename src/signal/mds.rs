@@ -20,7 +20,7 @@ const MAJORISATION_STEPS: usize = 3000;
 /// The first Newton step is at most this many times as long as the next majorising one, which keeps it in the basin.
 const FIRST_RADIUS: f64 = 3.0;
 /// The gradient has vanished when its norm is below this share of the norm of the attraction n P.
-const VANISHED: f64 = 1e-13;
+pub(super) const VANISHED: f64 = 1e-13;
 const NEWTON_STEPS: usize = 200;
 /// Curvature below this share of n, the typical one, is rounding.
 const FLAT: f64 = 1e-11;
@@ -63,8 +63,7 @@ impl Dissimilarities {
         Self { n, values }
     }
 
-    /// n.
-    pub fn count(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.n
     }
 
@@ -78,13 +77,18 @@ impl Dissimilarities {
         norm_squared(&self.values)
     }
 
+    /// delta, n x n.
+    pub fn matrix(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.values, self.n, self.n)
+    }
+
     /// delta_i1 .. delta_in.
-    pub fn row(&self, i: usize) -> &[f64] {
+    pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.n..(i + 1) * self.n]
     }
 
     /// Rows and columns in another order.
-    fn permuted(&self, order: &[usize]) -> Self {
+    pub(super) fn permuted(&self, order: &[usize]) -> Self {
         let rows = order.iter().map(|&i| self.row(i));
         let values = rows.flat_map(|row| order.iter().map(|&j| row[j])).collect();
         Self { n: self.n, values }
@@ -145,28 +149,39 @@ vectorised! {
 }
 
 /// The scaling problem, free points first.
-struct Problem {
-    delta: Dissimilarities,
-    free: usize,
+pub(super) struct Problem {
+    pub delta: Dissimilarities,
+    pub free: usize,
     /// Free points in ranges of about as many pairs each.
     parts: Vec<Range<usize>>,
 }
 
 /// Positions, one array a coordinate, for rows of vector arithmetic; free points first.
 #[derive(Clone)]
-struct Layout {
-    x: Vec<f64>,
-    y: Vec<f64>,
+pub(super) struct Layout {
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
+}
+
+/// How many steps a minimum took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Steps {
+    /// Guttman transforms.
+    pub majorising: usize,
+    /// Newton steps.
+    pub newton: usize,
+    /// Products with the Hessian, inside the Newton steps.
+    pub inner: usize,
 }
 
 /// What one pass over the pairs gives at a layout. Vectors over the free points hold all x before all y.
-struct Slope {
+pub(super) struct Slope {
     /// sum_j (delta_ij / d_ij) (p_i - p_j) of each free point.
     pull: Vec<f64>,
     /// Half the gradient of the stress at each free point.
-    gradient: Vec<f64>,
+    pub gradient: Vec<f64>,
     /// The stress (6) of the pairs that involve a free point.
-    stress: f64,
+    pub stress: f64,
 }
 
 /// Antisymmetric vectors of pairs summed at both their points, and a number of each pair.
@@ -216,15 +231,31 @@ impl Sums {
 }
 
 impl Layout {
+    /// The positions in another order.
+    pub fn of(order: &[usize], positions: &[Point]) -> Self {
+        let axis = |a: usize| order.iter().map(|&i| positions[i][a]).collect();
+        Self {
+            x: axis(0),
+            y: axis(1),
+        }
+    }
+
+    /// Puts the first points where they belong.
+    pub fn write(&self, order: &[usize], positions: &mut [Point]) {
+        for (k, &i) in order.iter().enumerate() {
+            positions[i] = self.point(k);
+        }
+    }
+
     fn sum(&self) -> Point {
         [self.x.iter().sum(), self.y.iter().sum()]
     }
 
-    fn point(&self, i: usize) -> Point {
+    pub fn point(&self, i: usize) -> Point {
         [self.x[i], self.y[i]]
     }
 
-    fn moved(&self, step: &[f64]) -> Self {
+    pub fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
         let (x, y) = step.split_at(step.len() / 2);
         axpy(1.0, x, &mut moved.x[..x.len()]);
@@ -234,7 +265,7 @@ impl Layout {
 }
 
 impl Problem {
-    fn new(delta: Dissimilarities, free: usize) -> Self {
+    pub fn new(delta: Dissimilarities, free: usize) -> Self {
         let fixed = delta.n - free;
         let pairs = |rows: usize| rows * rows / 2 + rows * fixed;
         let parts = if pairs(free) < PAIRS_ALONE { 1 } else { PARTS };
@@ -294,14 +325,14 @@ impl Problem {
     }
 
     /// The norm of n P about its centroid: what pulls the points together, and pushes them apart at a minimum.
-    fn typical_gradient(&self, layout: &Layout) -> f64 {
+    pub fn typical_gradient(&self, layout: &Layout) -> f64 {
         let n = self.delta.n as f64;
         let centre = layout.sum().map(|sum| sum / n);
         let spread = |values: &[f64], c: f64| values.iter().map(|v| (v - c).powi(2)).sum::<f64>();
         n * (spread(&layout.x, centre[0]) + spread(&layout.y, centre[1])).sqrt()
     }
 
-    fn slope(&self, layout: &Layout) -> Slope {
+    pub fn slope(&self, layout: &Layout) -> Slope {
         let sums = self.over_pairs(true, |i, others, terms| {
             let (x, y) = (&layout.x[others.clone()], &layout.y[others.clone()]);
             let delta = &self.delta.row(i)[others];
@@ -352,8 +383,17 @@ impl Problem {
         next
     }
 
+    /// Moves the free points of `positions`, whose order in the problem is `order`, to a minimum: by majorisation and then Newton's method.
+    pub fn minimise(&self, order: &[usize], positions: &mut [Point]) -> Steps {
+        let mut steps = Steps::default();
+        let layout = Layout::of(order, positions);
+        let (layout, slope) = majorisation(self, layout, &mut steps);
+        newton(self, layout, slope, &mut steps).write(&order[..self.free], positions);
+        steps
+    }
+
     /// The Hessian of half the stress times a displacement of the free points.
-    fn hessian_times(&self, layout: &Layout, step: &[f64]) -> Vec<f64> {
+    pub fn hessian_times(&self, layout: &Layout, step: &[f64]) -> Vec<f64> {
         let n = self.delta.n;
         let (mut u, mut v) = (vec![0.0; n], vec![0.0; n]);
         u[..self.free].copy_from_slice(&step[..self.free]);
@@ -369,9 +409,10 @@ impl Problem {
 }
 
 /// Majorises until a step lowers the stress by less than [`MAJORISED`] of it.
-fn majorisation(problem: &Problem, mut layout: Layout) -> (Layout, Slope) {
+fn majorisation(problem: &Problem, mut layout: Layout, steps: &mut Steps) -> (Layout, Slope) {
     let mut slope = problem.slope(&layout);
     for _ in 0..MAJORISATION_STEPS {
+        steps.majorising += 1;
         let next = problem.majorise(&layout, &slope);
         let next_slope = problem.slope(&next);
         let decrease = slope.stress - next_slope.stress;
@@ -389,6 +430,7 @@ fn newton_step(
     layout: &Layout,
     gradient: &[f64],
     radius: f64,
+    steps: &mut Steps,
 ) -> (Vec<f64>, f64) {
     let norm = norm_squared(gradient).sqrt();
     let relative = norm / problem.typical_gradient(layout);
@@ -399,6 +441,7 @@ fn newton_step(
     let mut square = norm_squared(&residual);
     let mut image = vec![0.0; gradient.len()];
     for _ in 0..2 * gradient.len() {
+        steps.inner += 1;
         let product = problem.hessian_times(layout, &direction);
         let curvature = dot(&direction, &product);
         let rounding = FLAT * problem.delta.n as f64 * norm_squared(&direction);
@@ -439,7 +482,7 @@ fn to_boundary(step: &[f64], direction: &[f64], radius: f64) -> f64 {
 }
 
 /// Trust-region Newton until the gradient vanishes or rounding stops it.
-fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
+fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope, steps: &mut Steps) -> Layout {
     let scale = problem.typical_gradient(&layout);
     let mut radius = FIRST_RADIUS * norm_squared(&slope.gradient).sqrt() / problem.delta.n as f64;
     for _ in 0..NEWTON_STEPS {
@@ -447,7 +490,8 @@ fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
         if norm <= VANISHED * scale {
             break;
         }
-        let (step, predicted) = newton_step(problem, &layout, &slope.gradient, radius);
+        steps.newton += 1;
+        let (step, predicted) = newton_step(problem, &layout, &slope.gradient, radius, steps);
         let next = layout.moved(&step);
         let next_slope = problem.slope(&next);
         // Half the stress is what the model speaks of. Below rounding the gradient judges instead.
@@ -480,26 +524,33 @@ fn newton(problem: &Problem, mut layout: Layout, mut slope: Slope) -> Layout {
 /// A local minimum is found: the one whose basin the start is in. O(n^2) a step; the steps read the dissimilarities and form nothing of their size.
 /// Pins must be valid ([`super::pins::validate_pins`]) and `start` finite.
 pub fn scale(delta: &Dissimilarities, start: &[Point], pins: &[Pin]) -> Vec<Point> {
-    let mut start = start.to_vec();
+    scale_counting(delta, start, pins).0
+}
+
+/// [`scale`], and how many steps it took.
+pub fn scale_counting(
+    delta: &Dissimilarities,
+    start: &[Point],
+    pins: &[Pin],
+) -> (Vec<Point>, Steps) {
+    let mut positions = start.to_vec();
     let mut pinned = vec![false; start.len()];
     for pin in pins {
-        start[pin.frame] = pin.position;
+        positions[pin.frame] = pin.position;
         pinned[pin.frame] = true;
     }
-    let (mut order, fixed): (Vec<usize>, Vec<usize>) = (0..start.len()).partition(|&i| !pinned[i]);
+    let (order, free) = free_first(&pinned);
+    let problem = Problem::new(delta.permuted(&order), free);
+    let steps = problem.minimise(&order, &mut positions);
+    (positions, steps)
+}
+
+/// The order of the points in which those not pinned come first, and how many these are.
+pub(super) fn free_first(pinned: &[bool]) -> (Vec<usize>, usize) {
+    let (mut order, fixed): (Vec<usize>, Vec<usize>) = (0..pinned.len()).partition(|&i| !pinned[i]);
     let free = order.len();
     order.extend(fixed);
-    let problem = Problem::new(delta.permuted(&order), free);
-    let layout = Layout {
-        x: order.iter().map(|&i| start[i][0]).collect(),
-        y: order.iter().map(|&i| start[i][1]).collect(),
-    };
-    let (layout, slope) = majorisation(&problem, layout);
-    let layout = newton(&problem, layout, slope);
-    for (k, &i) in order.iter().enumerate().take(free) {
-        start[i] = layout.point(k);
-    }
-    start
+    (order, free)
 }
 
 /// The stress (6) of a layout: sum over pairs of (||p_i - p_j|| - delta_ij)^2. O(n^2).

@@ -4,7 +4,7 @@
 //! | paper | here |
 //! |---|---|
 //! | 2.1, 3.1 shape signal h | [`h`] |
-//! | 3.2.1 pose-space positions, pins | [`mds`], [`pins`] |
+//! | 3.2.1 pose-space positions, pins | [`mds`], [`pins`], [`repin`] |
 //! | 2.2, 3.2 pose signal g | [`g`] |
 //! | 3.2.2 site order | [`sites`] |
 //! | 2.3, 3.3 time signal f: parameters, knots, spline, rho | [`parameters`], [`knots`], [`f`], [`rho`] |
@@ -12,6 +12,11 @@
 //! | (readings 8, 10) repeated poses | [`poses`] |
 //! | 3 the reconstruction, errors (2), (3), (4), (7) | [`fit`] |
 //! | 3.4 k, l, m from a tolerance | [`fidelity`] |
+//! | (6, beyond the paper) (2) minimised itself | [`refine`] |
+//! | 4.1 edits of the time signal, knots that leave it as it is | [`edit`], [`insert`]; in files [`edits_toml`] |
+//! | 4.2 times for other rates, slow and fast motion | [`resample`] |
+//! | 4.3 transfer by examples | [`transfer`] |
+//! | 4.4 poses placed by hand, a sketched curve | [`design`], [`sketch`] |
 //! | 6 a layout that needs no pins | [`layout`] |
 //! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`cubic`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
@@ -21,6 +26,9 @@
 
 mod basis;
 pub mod cubic;
+pub mod design;
+pub mod edit;
+pub mod edits_toml;
 pub mod f;
 pub mod fidelity;
 pub mod file;
@@ -28,6 +36,7 @@ pub mod fit;
 pub mod g;
 pub mod h;
 pub mod in_space;
+pub mod insert;
 pub mod knots;
 pub mod layout;
 pub mod leave_out;
@@ -36,10 +45,16 @@ pub mod parameters;
 pub mod pins;
 pub mod poses;
 pub mod psi;
+pub mod refine;
+pub mod repin;
+pub mod resample;
 pub mod rho;
 pub mod saddles;
 pub mod sites;
+pub mod sketch;
+mod strand;
 pub mod thin_plate;
+pub mod transfer;
 
 /// A point of the pose plane.
 pub type Point = [f64; 2];

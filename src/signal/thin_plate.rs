@@ -51,6 +51,19 @@ vectorised! {
     }
 }
 
+vectorised! {
+    /// The gradient with respect to the place p of phi(||site - p||) for each site, one axis after the other: (2 ln r + 1) (p - site), and 0 at a site.
+    pub fn kernel_gradients(p: Point, sites: &[Point], x: &mut [f64], y: &mut [f64]) {
+        for ((s, x), y) in sites.iter().zip(x).zip(y) {
+            let d = [p[0] - s[0], p[1] - s[1]];
+            let r_squared = d[0] * d[0] + d[1] * d[1];
+            let factor = if r_squared >= f64::MIN_POSITIVE { ln(r_squared) + 1.0 } else { 0.0 };
+            *x = factor * d[0];
+            *y = factor * d[1];
+        }
+    }
+}
+
 /// Sites closer to a line than this share of their extent along it count as collinear.
 const COLLINEAR: f64 = 1e-9;
 
@@ -105,6 +118,11 @@ impl Frame {
     pub fn normalise(&self, p: Point) -> Point {
         (self.axes.transpose() * (Vector2::from(p) - self.centre) / self.size).into()
     }
+
+    /// The point that [`Self::normalise`] takes to `q`.
+    pub fn restore(&self, q: Point) -> Point {
+        (self.axes * Vector2::from(q) * self.size + self.centre).into()
+    }
 }
 
 #[cfg(test)]
@@ -142,5 +160,23 @@ mod tests {
         assert_eq!(values[1..3], [0.0, 0.0]);
         kernels([1.0, 0.0], &points, &mut values);
         assert_eq!(values[3], 0.0);
+    }
+    #[test]
+    fn gradients_are_those_of_the_kernel() {
+        let sites = [[0.3, -0.2], [1.5, 2.0], [0.0, 0.0]];
+        let (mut x, mut y) = ([0.0; 3], [0.0; 3]);
+        kernel_gradients([0.0, 0.0], &sites, &mut x, &mut y);
+        let at = |p: Point| {
+            let mut values = [0.0; 3];
+            kernels(p, &sites, &mut values);
+            values
+        };
+        let h = 1e-6;
+        for j in 0..2 {
+            let along = |p: Point| (at(p)[j] - at([-p[0], -p[1]])[j]) / (2.0 * h);
+            assert!((along([h, 0.0]) - x[j]).abs() < 1e-8);
+            assert!((along([0.0, h]) - y[j]).abs() < 1e-8);
+        }
+        assert_eq!((x[2], y[2]), (0.0, 0.0));
     }
 }

@@ -1,16 +1,18 @@
 //! The algorithms as named stages: plain arrays in, plain arrays out. `oracles/PROTOCOL.md` gives every stage's arrays.
 
+pub mod poisson;
 pub mod sequence;
 pub mod shape;
 pub mod signal;
 
 use std::path::PathBuf;
 
-use faer::MatRef;
+use faer::{Mat, MatRef};
 use thiserror::Error;
 
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::sequence::Sequence;
+use crate::shape::{SpaceKind, encode_all, prepare_for};
 
 /// One step of an algorithm.
 pub struct Stage {
@@ -42,14 +44,19 @@ pub enum StageError {
 }
 
 impl StageError {
-    fn from_error(error: impl std::error::Error) -> Self {
+    pub(crate) fn from_error(error: impl std::error::Error) -> Self {
         Self::Failed(error.to_string())
     }
 }
 
 /// Every stage, by system and in the order of the paper.
 pub fn all() -> impl Iterator<Item = &'static Stage> {
-    let systems = [sequence::STAGES, shape::STAGES, signal::STAGES];
+    let systems = [
+        sequence::STAGES,
+        shape::STAGES,
+        poisson::STAGES,
+        signal::STAGES,
+    ];
     systems.into_iter().flatten()
 }
 
@@ -91,6 +98,13 @@ fn call<T: 'static>(
     }))
 }
 
+/// The frames of a sequence in a space whose reference is the first of them.
+fn in_space(sequence: &Sequence, kind: SpaceKind) -> Result<Mat<f64>, StageError> {
+    let space = prepare_for(kind, sequence.connectivity(), sequence.positions());
+    let space = space.map_err(StageError::from_error)?;
+    encode_all(&*space, sequence.positions()).map_err(StageError::from_error)
+}
+
 /// Inputs of a stage made from a sequence and, for `sequence.read`, the OBJ files it was read from.
 ///
 /// Stages of an algorithm are fed the Rust results of the stages before them, so that errors do not pile up.
@@ -121,7 +135,10 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
-        _ if stage.starts_with("shape.") => shape::inputs(stage, sequence),
-        _ => signal::inputs(stage, frames, choice),
+        "signal.transfer" => signal::transfer_inputs(sequence, choice),
+        _ if stage.starts_with("shape.poisson_") => poisson::inputs(sequence),
+        _ if stage.starts_with("shape.") => shape::inputs(stage, sequence, choice),
+        _ if choice.space == SpaceKind::Vertex => signal::inputs(stage, frames, choice),
+        _ => signal::inputs(stage, in_space(sequence, choice.space)?.as_ref(), choice),
     }
 }

@@ -4,10 +4,13 @@ use faer::{Mat, MatRef};
 
 use super::{Call, Stage, StageError, call};
 use crate::arrays::{Array, Bundle};
+use crate::sequence::Sequence;
+use crate::shape::{SpaceKind, encode_examples, prepare_for};
 use crate::signal::f::Spline;
 use crate::signal::fit::{Fit, FitOptions, fit};
 use crate::signal::g::PoseSignal;
 use crate::signal::h::shape_signal;
+use crate::signal::insert::insert_knots;
 use crate::signal::knots::{KnotRule, knots};
 use crate::signal::layout::{Distances, Layout};
 use crate::signal::mds::{Dissimilarities, scale};
@@ -16,6 +19,7 @@ use crate::signal::pins::{Pin, principal_start, validate_pins};
 use crate::signal::psi::{Representation, TimeSignal};
 use crate::signal::rho::Rho;
 use crate::signal::sites::site_order;
+use crate::signal::transfer::{ExampleBasis, frames_of_coordinates};
 
 /// In the order of the paper.
 pub static STAGES: &[Stage] = &[
@@ -73,6 +77,16 @@ pub static STAGES: &[Stage] = &[
         name: "signal.psi",
         about: "the representation at any times (equation (1))",
         prepare: psi,
+    },
+    Stage {
+        name: "signal.insert_knots",
+        about: "more knots, the same curve (section 4.1)",
+        prepare: more_knots,
+    },
+    Stage {
+        name: "signal.transfer",
+        about: "frames of one mesh as frames of another, by examples (section 4.3)",
+        prepare: transfer,
     },
     Stage {
         name: "signal",
@@ -144,15 +158,12 @@ fn layout(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
         move || {
             let distances = Distances::new(x.as_ref());
             let positions = distances.positions(x.as_ref(), weight, &[]);
-            let positions = positions.map_err(StageError::from_error)?;
+            let (positions, _) = positions.map_err(StageError::from_error)?;
             Ok((distances.mixed(weight), positions))
         },
         |(delta, positions)| {
-            let n = delta.count();
-            let data = (0..n).flat_map(|i| delta.row(i).iter().copied()).collect();
-            let shape = vec![n, n];
             Bundle::from([
-                ("delta", Array::F64 { shape, data }),
+                ("delta", Array::columns(delta.matrix())),
                 ("P", Array::points(positions)),
             ])
         },
@@ -325,15 +336,75 @@ fn frames_array(shape: [usize; 2], frames: &[f64]) -> Array {
     }
 }
 
+fn more_knots(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let spline = Spline {
+        control: inputs.points("control")?,
+        knots: inputs.vector("u")?.to_vec(),
+    };
+    let insert = inputs.vector("insert")?.to_vec();
+    let query = inputs.vector("query")?.to_vec();
+    call(
+        move || {
+            let refined = insert_knots(&spline, &insert).map_err(StageError::from_error)?;
+            let values = refined.evaluate_all(&query);
+            Ok((refined, values))
+        },
+        |(refined, values)| {
+            Bundle::from([
+                ("u", Array::vector(&refined.knots)),
+                ("control", Array::points(&refined.control)),
+                ("values", Array::points(values)),
+            ])
+        },
+    )
+}
+
+fn transfer(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let frames = inputs.matrix("Z")?;
+    let source = inputs.matrix("Q")?;
+    let target = inputs.matrix("R")?;
+    call(
+        move || {
+            let basis = ExampleBasis::new(source.as_ref()).map_err(StageError::from_error)?;
+            let x = basis.coordinates(frames.as_ref());
+            let x = x.map_err(StageError::from_error)?;
+            let moved = frames_of_coordinates(x.as_ref(), target.as_ref());
+            Ok((x, moved.map_err(StageError::from_error)?))
+        },
+        |(x, moved)| {
+            Bundle::from([
+                ("X", Array::columns(x.as_ref())),
+                ("W", Array::columns(moved.as_ref())),
+            ])
+        },
+    )
+}
+
+/// Frames of a sequence, m + 1 of them as examples, and those again in the gradient space, which stands for another mesh.
+pub fn transfer_inputs(sequence: &Sequence, choice: &Choice) -> Result<Bundle, StageError> {
+    let (n, d) = (sequence.frame_count(), sequence.dimension());
+    let count = (choice.m + 1).clamp(2, n.max(2));
+    let chosen: Vec<usize> = (0..count.min(n)).map(|j| j * n / count).collect();
+    let examples = sequence.select(&chosen).map_err(StageError::from_error)?;
+    let (mesh, poses) = (examples.connectivity(), examples.positions());
+    let space = prepare_for(SpaceKind::Gradient, mesh, poses);
+    let space = space.map_err(StageError::from_error)?;
+    let target = encode_examples(&*space, poses).map_err(StageError::from_error)?;
+    let rows = |data: &[f64]| frames_array([data.len() / d, d], data);
+    Ok(Bundle::from([
+        ("Z", rows(sequence.positions())),
+        ("Q", rows(examples.positions())),
+        ("R", Array::columns(target.as_ref())),
+    ]))
+}
+
 fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let frames: Mat<f64> = inputs.matrix("Z")?;
+    let [k, l, m] = ["k", "l", "m"].map(|name| inputs.integer(name));
     let options = FitOptions {
-        k: inputs.integer("k")?,
-        l: inputs.integer("l")?,
-        m: inputs.integer("m")?,
         knots: rule(inputs)?,
         layout: Layout::Mds,
-        pins: Vec::new(),
+        ..FitOptions::new(k?, l?, m?)
     };
     let n = frames.ncols();
     call(
@@ -353,7 +424,7 @@ fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     )
 }
 
-/// Inputs of every stage made from a sequence by the Rust stages before it, so that errors do not pile up.
+/// Inputs of every stage made from frames (d x n, of the choice's space) by the Rust stages before it, so that errors do not pile up.
 pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<Bundle, StageError> {
     let z = Array::columns(frames);
     let [k, l, m] = [choice.k, choice.l, choice.m].map(Array::integer);
@@ -368,6 +439,7 @@ pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<B
             ("l", l),
             ("m", m),
             ("rule", rule),
+            ("space", Array::Text(choice.space.to_string())),
         ]));
     }
     Chain::new(frames, choice)?.inputs(stage)
@@ -380,7 +452,7 @@ pub fn at_frames(frames: MatRef<'_, f64>, choice: &Choice) -> Result<Vec<f64>, S
     Ok(fit.representation.evaluate(&times))
 }
 
-/// k, l, m, the knot rule, and how many frames are pinned where a stage has pins.
+/// k, l, m, the knot rule, how many frames are pinned where a stage has pins, and the space that the signals are fitted in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub k: usize,
@@ -388,6 +460,7 @@ pub struct Choice {
     pub m: usize,
     pub knots: KnotRule,
     pub pins: usize,
+    pub space: SpaceKind,
 }
 
 /// The reconstruction, from which the inputs of its stages are taken.
@@ -402,12 +475,9 @@ impl Choice {
     /// The whole reconstruction with these constants.
     pub fn fit(&self, frames: MatRef<'_, f64>) -> Result<Fit, StageError> {
         let options = FitOptions {
-            k: self.k,
-            l: self.l,
-            m: self.m,
             knots: self.knots,
             layout: Layout::Mds,
-            pins: Vec::new(),
+            ..FitOptions::new(self.k, self.l, self.m)
         };
         fit(frames, &options).map_err(StageError::from_error)
     }
@@ -455,6 +525,12 @@ impl<'a> Chain<'a> {
                 ("u", Array::vector(&time.spline.knots)),
                 ("query", Array::vector(&self.parameters())),
             ]),
+            "signal.insert_knots" => Bundle::from([
+                ("control", Array::points(&time.spline.control)),
+                ("u", Array::vector(&time.spline.knots)),
+                ("insert", Array::vector(&self.new_knots())),
+                ("query", Array::vector(&self.parameters())),
+            ]),
             "signal.rho" => Bundle::from([t(), ("query", Array::vector(&self.times))]),
             "signal.psi" => {
                 let mut inputs = representation_arrays(&self.fit.representation);
@@ -488,6 +564,25 @@ impl<'a> Chain<'a> {
             ("fixed", Array::indices(&fixed)),
             ("positions", Array::points(&positions)),
         ])
+    }
+
+    /// Parameters midway between some frames, one of them twice, and a knot that is there already.
+    fn new_knots(&self) -> Vec<f64> {
+        let time = &self.fit.representation.time;
+        let (t, u) = (distinct(&time.parameters), &time.spline.knots);
+        let step = (t.len() / 6).max(1);
+        let mut new: Vec<f64> = t
+            .windows(2)
+            .step_by(step)
+            .map(|w| 0.5 * (w[0] + w[1]))
+            .collect();
+        new.reverse();
+        new.extend(new.first().copied());
+        let inner = u
+            .iter()
+            .find(|&&x| x > t[0] && x < t[t.len() - 1] && !new.contains(&x));
+        new.extend(inner);
+        new
     }
 
     fn parameters(&self) -> Vec<f64> {

@@ -155,18 +155,21 @@ fn times_and_counts_out_of_range() {
     }
     sample(&["--times", "1,soon"], &["--times", "soon"]);
     sample(&["--times", ""], &["--times"]);
-    sample(&["--count", "0"], &["--count 0", "1 to 10000000"]);
     sample(
-        &["--count", "10000001"],
-        &["--count 10000001", "1 to 10000000"],
+        &["--frames", "0"],
+        &["--frames", "0 frames", "1 to 10000000"],
     );
-    sample(&["--count", "-5"], &["--count", "-5", "whole number"]);
+    sample(
+        &["--frames", "10000001"],
+        &["--frames", "10000001 frames", "1 to 10000000"],
+    );
+    sample(&["--frames", "-5"], &["--frames", "-5", "whole number"]);
     // 10^7 frames of 36 numbers are 2.9 GB, more than this run may have.
     sample(
-        &["--count", "10000000"],
+        &["--frames", "10000000"],
         &["10000000 frames", "3 GB", "memory", "fewer"],
     );
-    sample(&["--count", "3", "--times", "1"], &["--count", "--times"]);
+    sample(&["--frames", "3", "--times", "1"], &["--frames", "--times"]);
 }
 
 #[test]

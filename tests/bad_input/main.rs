@@ -9,6 +9,7 @@ mod outputs;
 mod pins;
 mod representations;
 mod sequences;
+mod verbs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -6,7 +6,7 @@ use meshseq::arrays::{Array, Bundle};
 use meshseq::sequence::format::npz;
 use meshseq::signal::file::load;
 
-use super::common::Scratch;
+use super::common::{Scratch, must};
 use super::{good, refused};
 
 struct Bad {
@@ -212,6 +212,53 @@ fn files_of_another_kind() {
         fs::write(bad.scratch.at("cut.npz"), &bytes[..length]).unwrap();
         bad.refused("cut.npz", &[]);
     }
+}
+
+#[test]
+fn patches_that_are_none() {
+    let mut bad = Bad::new();
+    let fit = "--k 6 --l 5 --m 3 --space patch".split_whitespace();
+    let (from, to) = (bad.scratch.arg("good.npz"), bad.scratch.arg("patch.npz"));
+    let places = [from.as_str(), "-o", to.as_str()];
+    let arguments: Vec<&str> = ["signal", "fit"]
+        .into_iter()
+        .chain(fit)
+        .chain(places)
+        .collect();
+    must(&arguments);
+    let arrays = npz::read_arrays(&bad.scratch.at("patch.npz")).unwrap();
+    bad.good = Bundle(arrays.into_iter().collect());
+    let labels = bad.good.integers("patches").unwrap().to_vec();
+    let with = |change: fn(&mut Vec<i64>), words: &[&str]| {
+        let mut labels = labels.clone();
+        change(&mut labels);
+        bad.with(|b| b.put("patches", Array::integers(&labels)), words);
+    };
+    bad.with(
+        |b| drop(b.0.remove("patches")),
+        &["`patches`", "expected it to be there"],
+    );
+    bad.with(
+        |b| b.put("patches", Array::vector(&[0.0; 12])),
+        &["`patches`", "an i64 array of rank 1"],
+    );
+    with(
+        |p| {
+            p.pop();
+        },
+        &["11 patch labels for 12 triangles"],
+    );
+    with(|p| p[3] = -1, &["triangle 3", "label -1"]);
+    with(
+        |p| p[3] = i64::MAX,
+        &["triangle 3", "label 9223372036854775807"],
+    );
+    with(|p| p.fill(1), &["no triangle has the patch label 0"]);
+    // Labels of another division: another number of pairs.
+    with(
+        |p| (0..).zip(p).for_each(|(i, p)| *p = i),
+        &["representation", "numbers"],
+    );
 }
 
 /// Whatever byte is damaged, loading says so: every byte that matters is under a checksum or compared.

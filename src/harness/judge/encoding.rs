@@ -94,14 +94,14 @@ pub(super) fn rotation(vector: &[f64]) -> Matrix3<f64> {
 }
 
 /// S from S_xx, S_yy, S_zz, sqrt2 S_yz, sqrt2 S_xz, sqrt2 S_xy.
-fn stretch(numbers: &[f64]) -> Matrix3<f64> {
+pub(super) fn stretch(numbers: &[f64]) -> Matrix3<f64> {
     let [yz, xz, xy] = [3, 4, 5].map(|i| numbers[i] * 0.5f64.sqrt());
     let [x, y, z] = [numbers[0], numbers[1], numbers[2]];
     Matrix3::new(x, xy, xz, xy, y, yz, xz, yz, z)
 }
 
 /// D = [e1 e2 (e1 x e2)/sqrt|e1 x e2|].
-fn frame_matrix(edges: [Vector3<f64>; 2]) -> Matrix3<f64> {
+pub(super) fn frame_matrix(edges: [Vector3<f64>; 2]) -> Matrix3<f64> {
     let normal = edges[0].cross(&edges[1]);
     let length = normal.norm();
     let scaled = if length > 0.0 {

@@ -6,11 +6,15 @@ mod chain;
 mod distance;
 mod encoding;
 mod forms;
+mod halfway;
+mod patched;
 mod pipeline;
 mod pose;
 mod scaling;
 mod shape;
+mod sparse;
 mod time;
+mod transfer;
 
 use crate::arrays::{ArrayError, Bundle};
 
@@ -34,9 +38,12 @@ fn judge(stage: &str) -> Option<Judge> {
         "sequence.distance" => (distance::own, distance::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
-        "shape.gradient_decode" | "shape.lric_decode" => {
+        "shape.patch_encode" => (patched::own, patched::against),
+        "shape.gradient_decode" | "shape.lric_decode" | "shape.patch_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
         }
+        "shape.poisson_factor" | "shape.poisson_solve" => (sparse::own, sparse::against),
+        "shape.halfway" => (halfway::own, halfway::against),
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
         "signal.mds_fixed" => (scaling::fixed_own, scaling::fixed_against),
@@ -48,6 +55,8 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.spline" => (time::spline_own, time::spline_against),
         "signal.rho" => (time::rho_own, time::rho_against),
         "signal.psi" => (chain::psi_own, chain::psi_against),
+        "signal.insert_knots" => (time::more_knots_own, time::more_knots_against),
+        "signal.transfer" => (transfer::own, transfer::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };

@@ -34,15 +34,12 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
     let (shape, given) = inputs.f64("Z", 2)?;
     let (n, d) = (shape[0], shape[1]);
     let data = shape::centred_square(inputs.columns("Z")?);
-    let rms = (a.error_psi / (n * d / 3) as f64).sqrt();
     let [claimed_h, claimed_g, claimed_f] = claims(inputs, &a)?;
-    Ok(vec![
+    let mut found = vec![
         ("error_h", a.errors[0]),
         ("error_g", a.errors[1]),
         ("error_f", a.errors[2]),
         ("error_psi", a.error_psi),
-        ("relative_rms", share(rms, diagonal(&given[..d], 3))),
-        ("kg_percent", kg_percent(given, d, a.error_psi)),
         ("claimed_error_h", claimed_h),
         ("claimed_error_g", claimed_g),
         ("claimed_error_f", claimed_f),
@@ -50,7 +47,27 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
             "claimed_error_psi",
             error_gap(a.error_psi, a.errors[3], data),
         ),
-    ])
+    ];
+    if of_vertices(inputs)? {
+        let rms = (a.error_psi / (n * d / 3) as f64).sqrt();
+        found.push(("relative_rms", share(rms, diagonal(&given[..d], 3))));
+        found.push(("kg_percent", kg_percent(given, d, a.error_psi)));
+    }
+    Ok(found)
+}
+
+/// Whether the numbers of a frame are positions; in other spaces distances of vertices cannot be told from them.
+fn of_vertices(inputs: &Bundle) -> Result<bool, ArrayError> {
+    Ok(inputs.text("space")? == "vertex")
+}
+
+/// What a difference of numbers is held against: the diagonal, or in other spaces the root mean square distance of the frames from their mean.
+fn size(inputs: &Bundle) -> Result<f64, ArrayError> {
+    let (shape, given) = inputs.f64("Z", 2)?;
+    Ok(match of_vertices(inputs)? {
+        true => diagonal(&given[..shape[1]], 3),
+        false => (shape::centred_square(inputs.columns("Z")?) / shape[0] as f64).sqrt(),
+    })
 }
 
 /// What (3), (4) and (7) as claimed are away from the least there can be for this m, these sites, and this k and knot rule at these positions.
@@ -98,8 +115,7 @@ pub fn against(
 ) -> Result<Vec<Measured>, ArrayError> {
     let (a, b) = (answer(inputs, ours)?, answer(inputs, theirs)?);
     let data = shape::centred_square(inputs.columns("Z")?);
-    let d = inputs.columns("Z")?.nrows();
-    let size = diagonal(&inputs.f64("Z", 2)?.1[..d], 3);
+    let size = size(inputs)?;
     let plane = diagonal(a.p.as_flattened(), 2);
     Ok(vec![
         (

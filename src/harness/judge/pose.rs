@@ -7,7 +7,7 @@ use crate::arrays::{ArrayError, Bundle};
 use crate::linalg::dense::{Qr, thin_svd};
 
 /// phi(r) = r^2 ln r.
-fn phi(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub fn phi(a: [f64; 2], b: [f64; 2]) -> f64 {
     let r = (a[0] - b[0]).hypot(a[1] - b[1]);
     if r > 0.0 { r * r * r.ln() } else { 0.0 }
 }
@@ -61,23 +61,22 @@ pub fn rbf_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, Array
     let reach = diagonal(a.p.as_flattened(), 2);
     Ok(vec![
         ("error_g", residual.squared_norm_l2()),
-        ("side_conditions", side_conditions(&a, reach)),
+        ("side_conditions", side_conditions(&a.g, &a.sites, reach)),
         ("formula", share(greatest(&recomputed, values), size)),
         ("stationarity", stationarity(&a, &residual)),
     ])
 }
 
 /// sum_j g_j and sum_j g_j s_j^T, as a share of the sums of magnitudes; sites about their first.
-fn side_conditions(a: &Answer, reach: f64) -> f64 {
-    let l = a.sites.len();
+pub fn side_conditions(g: &Mat<f64>, sites: &[[f64; 2]], reach: f64) -> f64 {
+    let l = sites.len();
     let mut worst = 0.0f64;
-    for r in 0..a.g.nrows() {
-        let total: f64 = (0..l).map(|j| a.g[(r, j + 1)].abs()).sum();
-        let sum = |f: &dyn Fn(usize) -> f64| (0..l).map(|j| a.g[(r, j + 1)] * f(j)).sum::<f64>();
-        let first = a.sites[0];
+    for r in 0..g.nrows() {
+        let total: f64 = (0..l).map(|j| g[(r, j + 1)].abs()).sum();
+        let sum = |f: &dyn Fn(usize) -> f64| (0..l).map(|j| g[(r, j + 1)] * f(j)).sum::<f64>();
         worst = worst.max(share(sum(&|_| 1.0).abs(), total));
         for axis in 0..2 {
-            let moment = sum(&|j| a.sites[j][axis] - first[axis]).abs();
+            let moment = sum(&|j| sites[j][axis] - sites[0][axis]).abs();
             worst = worst.max(share(moment, total * reach));
         }
     }
@@ -104,7 +103,7 @@ fn stationarity(a: &Answer, residual: &Mat<f64>) -> f64 {
 }
 
 /// The functions that meet the side conditions, at the points: [Phi N, 1, p], N the null space of [1 s]^T. None where the SVD fails.
-fn space(p: &[[f64; 2]], sites: &[[f64; 2]]) -> Option<Mat<f64>> {
+pub fn space(p: &[[f64; 2]], sites: &[[f64; 2]]) -> Option<Mat<f64>> {
     let reach = diagonal(p.as_flattened(), 2);
     let reach = if reach > 0.0 { reach } else { 1.0 };
     let unit = |q: &[f64; 2]| [(q[0] - p[0][0]) / reach, (q[1] - p[0][1]) / reach];

@@ -138,7 +138,7 @@ pub fn knots_against(
 }
 
 /// B_j(u) for j = 0..k by the recursion of Cox & de Boor, in its definition's form: slow and plain. `full` are the k + 4 knots.
-fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
+pub fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
     if degree == 0 {
         let last = full[full.len() - 1];
         let closes = u == last && full[j] < last && full[j + 1] == last;
@@ -164,7 +164,7 @@ fn basis(full: &[f64], j: usize, degree: usize, u: f64) -> f64 {
 }
 
 /// One more copy of each end knot.
-fn full(u: &[f64]) -> Vec<f64> {
+pub fn full(u: &[f64]) -> Vec<f64> {
     let ends = (u.first().copied(), u.last().copied());
     ends.0
         .into_iter()
@@ -278,6 +278,59 @@ pub fn spline_against(
             ),
         ),
         ("query_difference", share(query, a.size)),
+    ])
+}
+
+struct Refined<'a> {
+    u: &'a [f64],
+    control: Vec<[f64; 2]>,
+    values: Vec<[f64; 2]>,
+    size: f64,
+}
+
+fn refined<'a>(inputs: &Bundle, outputs: &'a Bundle) -> Result<Refined<'a>, ArrayError> {
+    let k = inputs.points("control")?.len() + inputs.vector("insert")?.len();
+    shaped(outputs, "control", &[k, 2])?;
+    shaped(outputs, "values", &[inputs.vector("query")?.len(), 2])?;
+    Ok(Refined {
+        u: shaped(outputs, "u", &[k + 2])?,
+        control: outputs.points("control")?,
+        values: outputs.points("values")?,
+        size: diagonal(inputs.points("control")?.as_flattened(), 2),
+    })
+}
+
+/// The knots are the old and the new ones, and the curve of the new control points is the old one.
+pub fn more_knots_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
+    let found = refined(inputs, outputs)?;
+    let (u, control) = (inputs.vector("u")?, inputs.points("control")?);
+    let mut merged = [u, inputs.vector("insert")?].concat();
+    merged.sort_by(f64::total_cmp);
+    let (mut formula, mut moved) = (0.0f64, 0.0f64);
+    for (&at, value) in inputs.vector("query")?.iter().zip(&found.values) {
+        formula = formula.max(greatest(&curve(found.u, &found.control, at), value));
+        moved = moved.max(greatest(&curve(u, &control, at), value));
+    }
+    Ok(vec![
+        ("knots", greatest(found.u, &merged)),
+        ("formula", share(formula, found.size)),
+        ("curve", share(moved, found.size)),
+    ])
+}
+
+pub fn more_knots_against(
+    inputs: &Bundle,
+    ours: &Bundle,
+    theirs: &Bundle,
+) -> Result<Vec<Measured>, ArrayError> {
+    let (a, b) = (refined(inputs, ours)?, refined(inputs, theirs)?);
+    let gap = |a: &[[f64; 2]], b: &[[f64; 2]], size| {
+        share(greatest(a.as_flattened(), b.as_flattened()), size)
+    };
+    Ok(vec![
+        ("u_difference", greatest(a.u, b.u)),
+        ("control_difference", gap(&a.control, &b.control, a.size)),
+        ("value_difference", gap(&a.values, &b.values, a.size)),
     ])
 }
 

@@ -104,6 +104,19 @@ impl Axis {
         }
     }
 
+    /// Axes that hold `x` and `y`, on which a unit is as long across as up, for a plane `across` pixels wide; and the plane's height in pixels,
+    /// between `heights`.
+    pub(super) fn equal(x: &Self, y: &Self, across: f64, heights: (f64, f64)) -> (Self, Self, f64) {
+        let (wide, high) = (x.high - x.low, y.high - y.low);
+        let up = (across * high / wide).clamp(heights.0, heights.1);
+        let unit = (wide / across).max(high / up);
+        let widen = |axis: &Self, length: f64| {
+            let middle = (axis.low + axis.high) / 2.0;
+            Self::between((middle - length / 2.0, middle + length / 2.0), 7)
+        };
+        (widen(x, unit * across), widen(y, unit * up), up)
+    }
+
     /// Counts from `first` to `last`, with ticks at whole numbers only and room for a point at either end.
     pub(super) fn counts(first: usize, last: usize, most: usize) -> Self {
         let (a, b) = (first as f64, last.max(first) as f64);
@@ -149,11 +162,6 @@ impl Axis {
     /// The lower end.
     pub(super) fn low(&self) -> f64 {
         self.low
-    }
-
-    /// The upper end.
-    pub(super) fn high(&self) -> f64 {
-        self.high
     }
 
     /// The edge of a logarithmic axis that `x` is put on because it lies beyond; none where it lies within.

@@ -6,6 +6,7 @@
 mod axis;
 mod canvas;
 pub(super) mod constants;
+pub(super) mod exhibit;
 pub(super) mod frame_errors;
 mod legend;
 pub(super) mod singular_values;

@@ -173,16 +173,8 @@ fn equal_axes(shown: &Shown) -> (Axis, Axis, i32) {
     };
     let x = Axis::padded(along(0), 0.05, 6);
     let y = Axis::padded(along(1), 0.05, 6);
-    let (wide, high) = (x.high() - x.low(), y.high() - y.low());
-    let across = f64::from(WIDTH - SIDES);
-    let up = (across * high / wide).clamp(HEIGHTS.0, HEIGHTS.1);
-    let unit = (wide / across).max(high / up);
-    let widen = |axis: &Axis, length: f64| {
-        let middle = (axis.low() + axis.high()) / 2.0;
-        Axis::between((middle - length / 2.0, middle + length / 2.0), 7)
-    };
-    let axes = (widen(&x, unit * across), widen(&y, unit * up));
-    (axes.0, axes.1, up.round() as i32 + ENDS)
+    let (x, y, up) = Axis::equal(&x, &y, f64::from(WIDTH - SIDES), HEIGHTS);
+    (x, y, up.round() as i32 + ENDS)
 }
 
 fn polygon(canvas: &Canvas, control: &[Option<[f64; 2]>]) -> Result<(), PlotError> {

@@ -88,11 +88,13 @@ pub fn write_views(path: &Path, arrays: &[(&str, ArrayView)]) -> Result<(), Form
             ));
         }
     }
-    let entries: Vec<_> = arrays
-        .iter()
-        .map(|(name, array)| entry(name, *array))
-        .collect();
-    bytes::write_file(path, |out| zip_write::write(out, &entries))
+    bytes::write_file(path, |out| {
+        let mut archive = zip_write::Archive::new(out);
+        for (name, array) in arrays {
+            archive.add(&entry(name, *array))?;
+        }
+        archive.finish()
+    })
 }
 
 fn entry<'a>(name: &str, array: ArrayView<'a>) -> zip_write::Entry<'a> {

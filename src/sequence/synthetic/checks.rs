@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
+use crate::mesh::topology::{self, HalfEdge, Topology, linked};
 use crate::sequence::Sequence;
 
 /// The vertices of one frame.
@@ -25,26 +26,68 @@ fn directed_edges(sequence: &Sequence) -> HashMap<(u32, u32), usize> {
     edges
 }
 
-/// V - E + F and the number of boundary edges of a connected, oriented manifold without unused vertices; panics when it is none.
-fn euler(sequence: &Sequence) -> (isize, usize) {
+/// What a connected manifold without unused vertices is like.
+pub(super) struct Manifold {
+    /// V - E + F.
+    pub characteristic: isize,
+    /// Number of edges with one triangle.
+    pub boundary: usize,
+    /// Whether its triangles can be turned round so that they all face the same side.
+    pub orientable: bool,
+}
+
+/// Panics when the triangles are no connected manifold or leave a vertex out.
+pub(super) fn manifold(sequence: &Sequence) -> Manifold {
     let mesh = sequence.connectivity();
-    let edges = directed_edges(sequence);
-    assert!(
-        edges.values().all(|&n| n == 1),
-        "an edge is used twice in one direction"
-    );
-    let boundary = edges
-        .keys()
-        .filter(|&&(a, b)| !edges.contains_key(&(b, a)))
-        .count();
-    let undirected = (edges.len() + boundary) / 2;
+    let (vertices, faces) = (mesh.vertex_count(), mesh.faces());
+    let topology = Topology::new(faces);
+    assert_eq!(topology.non_manifold().count(), 0);
     assert_eq!(components(sequence), 1);
-    assert!(
-        fans_are_single(sequence),
+    assert_eq!(
+        fans(&topology, faces),
+        vertices,
         "two fans of triangles meet at one vertex only"
     );
-    let (v, e, f) = (mesh.vertex_count(), undirected, mesh.faces().len());
-    (v as isize - e as isize + f as isize, boundary)
+    Manifold {
+        characteristic: vertices as isize - topology.edges().len() as isize + faces.len() as isize,
+        boundary: topology.boundary().count(),
+        orientable: sides(&topology, faces.len()) == 2,
+    }
+}
+
+/// How many fans of triangles there are: corners of one vertex hang together where their triangles share an edge.
+fn fans(topology: &Topology, faces: &[[u32; 3]]) -> usize {
+    let corner = |half: HalfEdge, vertex: u32| {
+        let own = faces[half.triangle as usize]
+            .iter()
+            .position(|&v| v == vertex);
+        3 * half.triangle + own.unwrap() as u32
+    };
+    let links = topology.pairs().flat_map(|pair| {
+        let ends = topology.edges()[pair.edge as usize];
+        ends.map(|v| [corner(pair.first, v), corner(pair.second, v)])
+    });
+    linked(3 * faces.len(), links).1
+}
+
+/// How many sides a connected surface has: each triangle has two, and neighbours are glued side to side.
+fn sides(topology: &Topology, faces: usize) -> usize {
+    let links = topology.pairs().flat_map(|pair| {
+        let flips = u32::from(pair.first.ascending == pair.second.ascending);
+        let (a, b) = (2 * pair.first.triangle, 2 * pair.second.triangle);
+        [[a, b + flips], [a + 1, b + 1 - flips]]
+    });
+    linked(2 * faces, links).1
+}
+
+/// V - E + F and the number of boundary edges of a connected, oriented manifold without unused vertices; panics when it is none.
+fn euler(sequence: &Sequence) -> (isize, usize) {
+    assert!(
+        directed_edges(sequence).values().all(|&n| n == 1),
+        "an edge is used twice in one direction"
+    );
+    let found = manifold(sequence);
+    (found.characteristic, found.boundary)
 }
 
 /// Asserts a closed, connected, oriented manifold of genus 0 that faces outward and has no zero-area face in any frame.
@@ -63,59 +106,10 @@ pub(super) fn assert_disc(sequence: &Sequence) {
     assert!(boundary > 0);
 }
 
-fn components(sequence: &Sequence) -> usize {
-    let mut root: Vec<usize> = (0..sequence.connectivity().vertex_count()).collect();
-    for &[a, b, c] in sequence.connectivity().faces() {
-        for (from, to) in [(a, b), (b, c)] {
-            let (from, to) = (find(&mut root, from as usize), find(&mut root, to as usize));
-            root[from] = to;
-        }
-    }
-    (0..root.len()).filter(|&v| root[v] == v).count()
-}
-
-fn find(root: &mut [usize], mut v: usize) -> usize {
-    while root[v] != v {
-        root[v] = root[root[v]];
-        v = root[v];
-    }
-    v
-}
-
-/// Whether the triangles at each vertex hang together by edges: one walk from a triangle reaches as many as there are.
-fn fans_are_single(sequence: &Sequence) -> bool {
-    let mut next = HashMap::new();
-    let mut degree = vec![0; sequence.connectivity().vertex_count()];
-    let mut start = vec![None; degree.len()];
-    for &[a, b, c] in sequence.connectivity().faces() {
-        for (v, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
-            next.insert((v, from), to);
-            degree[v as usize] += 1;
-            start[v as usize] = start[v as usize].or(Some(from));
-        }
-    }
-    let previous: HashMap<_, _> = next
-        .iter()
-        .map(|(&(v, from), &to)| ((v, to), from))
-        .collect();
-    (0..degree.len()).all(|v| {
-        let Some(first) = start[v] else { return false };
-        let mut head = first;
-        while let Some(&before) = previous.get(&(v as u32, head)) {
-            head = before;
-            if head == first {
-                break;
-            }
-        }
-        let (mut at, mut count) = (head, 0);
-        while let Some(&after) = next.get(&(v as u32, at)) {
-            (at, count) = (after, count + 1);
-            if at == head {
-                break;
-            }
-        }
-        count == degree[v]
-    })
+/// How many parts hang together by triangles.
+pub(super) fn components(sequence: &Sequence) -> usize {
+    let mesh = sequence.connectivity();
+    topology::components(mesh.vertex_count(), mesh.faces()).1
 }
 
 /// The volume enclosed in a frame, positive when the faces look outward.
@@ -138,6 +132,17 @@ fn smallest_area(sequence: &Sequence, frame: usize) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// The least quality of a triangle of a frame: area over the sum of its squared sides, 1 when equilateral and 0 when degenerate.
+pub(super) fn thinnest(sequence: &Sequence, frame: usize) -> f64 {
+    let quality = |[a, b, c]: [Vector3<f64>; 3]| {
+        let squares = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
+        12.0_f64.sqrt() * (b - a).cross(&(c - a)).norm() / squares
+    };
+    triangles(sequence, frame)
+        .map(quality)
+        .fold(f64::INFINITY, f64::min)
+}
+
 fn triangles(sequence: &Sequence, frame: usize) -> impl Iterator<Item = [Vector3<f64>; 3]> {
     let points = points(sequence.frame(frame));
     let faces = sequence.connectivity().faces().iter();
@@ -156,6 +161,12 @@ pub(super) fn largest_stretch(sequence: &Sequence, rest: &[Vector3<f64>]) -> f64
         }
     }
     worst
+}
+
+/// The root of the sum of squared distances between the vertices of two frames.
+pub(super) fn distance(sequence: &Sequence, i: usize, j: usize) -> f64 {
+    let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
+    pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
 /// How far the fastest vertex moves from frame `frame - 1` to `frame`.

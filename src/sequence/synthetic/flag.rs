@@ -108,10 +108,7 @@ mod tests {
     #[test]
     fn the_motion_nearly_repeats_with_the_wind() {
         let sequence = embedded("@flag").unwrap();
-        let distance = |i: usize, j: usize| {
-            let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
-            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-        };
+        let distance = |i: usize, j: usize| checks::distance(&sequence, i, j);
         for i in 0..FULL.frames - GUST {
             assert!(
                 distance(i, i + GUST) < 0.6 * distance(i, i + GUST / 2),

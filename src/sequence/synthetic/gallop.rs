@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::quadruped::{Animal, Build, CHEST, HEAD, LEGS, NECK, TAIL, TORSO};
-use super::skin::Weights;
-use super::{Marker, SyntheticError, assemble};
+use super::SyntheticError;
+use super::animals::{Animal, Pose, posed};
+use super::quadruped::{BONES, CHEST, HEAD, LEGS, NECK, TAIL, TORSO, about_z, bump};
 use crate::sequence::Sequence;
 
 /// Number of frames of `@gallop` and of `@gallop-small`: two cycles.
@@ -18,55 +18,20 @@ pub const FRAMES: usize = 24;
 /// Number of frames of one cycle.
 pub const CYCLE: usize = 12;
 
-pub(super) struct Size {
-    spacing: f64,
-    build: Build,
+pub(super) fn build(animal: Animal) -> Result<Sequence, SyntheticError> {
+    let poses: Vec<Pose> = (0..FRAMES).map(|i| pose(i as f64)).collect();
+    posed(animal, &poses)
 }
 
-pub(super) const FULL: Size = Size {
-    spacing: 0.046,
-    build: Build { limb: 1.0 },
-};
-pub(super) const SMALL: Size = Size {
-    spacing: 0.135,
-    build: Build { limb: 2.0 },
-};
-
-/// How far along the skin a bone's pull fades into the next one's.
-const REACH: f64 = 0.14;
-
-/// The joint markers, in the order of the bones.
-pub(super) fn markers(size: &Size) -> Vec<Marker> {
-    let animal = Animal::new(size.build);
-    let skin = animal.skin(size.spacing);
-    let marked = animal.marked(&skin.points).into_iter();
-    marked
-        .map(|(name, vertex)| Marker { name, vertex })
-        .collect()
-}
-
-pub(super) fn build(size: &Size) -> Result<Sequence, SyntheticError> {
-    let animal = Animal::new(size.build);
-    let skin = animal.skin(size.spacing);
-    let weights = Weights::new(&animal, &skin, size.spacing, REACH);
-    let frames: Vec<_> = (0..FRAMES)
-        .map(|i| {
-            let (root, rotations) = pose(i, animal.bones.len());
-            weights.skin(&skin.points, &animal.place(root, &rotations))
-        })
-        .collect();
-    assemble(skin.faces, &frames)
-}
-
-/// The motion of the root and the rotation of each bone relative to its parent, in frame `frame`.
-fn pose(frame: usize, bones: usize) -> (Isometry3<f64>, Vec<UnitQuaternion<f64>>) {
-    let drift = TAU * frame as f64 / FRAMES as f64;
+/// The pose of any quadruped `at` frames into the gallop (0-based, and between frames too); it repeats after 24.
+pub fn pose(at: f64) -> Pose {
+    let drift = TAU * at / FRAMES as f64;
     let vigour = 1.0 + 0.09 * (drift + 0.7).sin();
-    let phase = frame as f64 / CYCLE as f64 + 0.018 * (drift + 2.0).sin();
+    let phase = at / CYCLE as f64 + 0.018 * (drift + 2.0).sin();
     let wave = |lag: f64| (TAU * (phase - lag)).cos();
-    let mut rotations = vec![UnitQuaternion::identity(); bones];
+    let mut pose = Pose::rest(BONES);
 
-    let mut turn = |bone: usize, degrees: f64| rotations[bone] = about_z(vigour * degrees);
+    let mut turn = |bone: usize, degrees: f64| pose.turns[bone] = about_z(vigour * degrees);
     turn(TORSO, -6.0 * wave(0.62));
     turn(CHEST, 9.0 * wave(0.12));
     turn(NECK, -9.0 * wave(0.60) - 8.0);
@@ -82,9 +47,10 @@ fn pose(frame: usize, bones: usize) -> (Isometry3<f64>, Vec<UnitQuaternion<f64>>
             turn(first + i, degrees);
         }
     }
-    sway(&mut rotations, drift, phase);
+    sway(&mut pose.turns, drift, phase);
     let bob = Vector3::new(0.025 * wave(0.4), 0.02 + 0.06 * vigour * wave(0.92), 0.0);
-    (Isometry3::translation(bob.x, bob.y, bob.z), rotations)
+    pose.root = Isometry3::translation(bob.x, bob.y, bob.z);
+    pose
 }
 
 /// Turns tail and neck a little to the sides.
@@ -118,15 +84,6 @@ fn fore_leg(at: f64) -> [f64; 4] {
     ]
 }
 
-/// A smooth bump of height 1 and of period 1, about a third of a period wide, at 0.
-fn bump(at: f64) -> f64 {
-    (2.2 * ((TAU * at).cos() - 1.0)).exp()
-}
-
-fn about_z(degrees: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{checks, embedded, markers};
@@ -142,10 +99,7 @@ mod tests {
     #[test]
     fn the_second_cycle_resembles_the_first_but_differs() {
         let sequence = embedded("@gallop").unwrap();
-        let distance = |i: usize, j: usize| {
-            let pairs = sequence.frame(i).iter().zip(sequence.frame(j));
-            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-        };
+        let distance = |i: usize, j: usize| checks::distance(&sequence, i, j);
         for i in 0..CYCLE {
             let (across, along) = (distance(i, i + CYCLE), distance(i, (i + 6) % FRAMES));
             assert!(across < 0.35 * along, "{i}: {across} {along}");

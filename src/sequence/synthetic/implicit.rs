@@ -27,8 +27,8 @@ impl Cone {
     }
 }
 
-/// The smooth union of cones, in their order. Never empty.
-#[derive(Clone, Debug)]
+/// The smooth union of cones, in their order; at least one before it is asked for anything.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Solid {
     pub cones: Vec<Cone>,
 }
@@ -78,7 +78,7 @@ impl Solid {
 }
 
 /// The minimum of a and b, rounded where they differ by less than `blend`.
-fn smooth_minimum(a: f64, b: f64, blend: f64) -> f64 {
+pub(super) fn smooth_minimum(a: f64, b: f64, blend: f64) -> f64 {
     let overlap = (blend - (a - b).abs()).max(0.0);
     a.min(b) - overlap * overlap / (4.0 * blend)
 }

@@ -2,18 +2,30 @@
 //!
 //! Every sequence is deterministic to the bit on one machine (one thread, no clock, no chance) and takes well under a second in a release
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
-//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests.
+//! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests. Most are motions; `@face`,
+//! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time.
 
+pub mod animals;
 pub mod bar;
+pub mod book;
+pub mod character;
+pub mod face;
 pub mod flag;
 pub mod gallop;
 pub mod jelly;
+pub mod klein;
+pub mod ring;
 pub mod roll;
+pub mod trot;
 
+mod biped;
+mod body;
 #[cfg(test)]
 mod checks;
 mod cloth;
 mod grid;
+mod horse;
+mod hound;
 mod implicit;
 mod quadruped;
 mod ride;
@@ -26,6 +38,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use self::animals::Animal;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
 
@@ -67,6 +80,17 @@ pub enum SyntheticError {
         /// Every name there is, separated by commas.
         known: String,
     },
+    /// No frames were asked for.
+    #[error("expected at least one frame to make, found none; ask for one or more")]
+    NoFrames,
+    /// A strip without a quad.
+    #[error("a strip needs at least 1 x 1 quads, found {columns} x {rows}; give it more")]
+    NoQuads { columns: usize, rows: usize },
+    /// A strip rolled by a whole turn a column or more.
+    #[error(
+        "cannot roll a strip by {degrees} degrees: expected fewer than {limit} to either side, a whole turn a column"
+    )]
+    TooFar { degrees: f64, limit: f64 },
     /// A generator named a vertex that it did not make: a defect of this crate.
     #[error("an embedded sequence came out with bad faces, please report it: {0}")]
     Connectivity(#[from] ConnectivityError),
@@ -83,8 +107,10 @@ pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
 /// The markers of the embedded sequence of this name: the same names in the same order for all quadrupeds, none for the others.
 pub fn markers(name: &str) -> Result<Vec<Marker>, SyntheticError> {
     Ok(match entry(name)?.name {
-        "@gallop" => gallop::markers(&gallop::FULL),
-        "@gallop-small" => gallop::markers(&gallop::SMALL),
+        "@gallop" | "@gallop-poses" => animals::markers(Animal::Horse),
+        "@gallop-small" | "@gallop-poses-small" => animals::markers(Animal::SmallHorse),
+        "@trot" | "@trot-poses" => animals::markers(Animal::Hound),
+        "@trot-small" | "@trot-poses-small" => animals::markers(Animal::SmallHound),
         _ => Vec::new(),
     })
 }
@@ -194,7 +220,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 4082,
         faces: 8160,
         good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
-        build: || gallop::build(&gallop::FULL),
+        build: || gallop::build(Animal::Horse),
     },
     Entry {
         name: "@gallop-small",
@@ -203,7 +229,7 @@ const CATALOGUE: &[Entry] = &[
         vertices: 634,
         faces: 1264,
         good_for: "tests of articulated motion and of transfer between different connectivities",
-        build: || gallop::build(&gallop::SMALL),
+        build: || gallop::build(Animal::SmallHorse),
     },
     Entry {
         name: "@jelly",
@@ -222,6 +248,150 @@ const CATALOGUE: &[Entry] = &[
         faces: 984,
         good_for: "tests of large elastic deformation",
         build: || jelly::build(&jelly::SMALL),
+    },
+    Entry {
+        name: "@book",
+        summary: "an open book whose pages share one spine and turn over one after another",
+        frames: 40,
+        vertices: 3225,
+        faces: 6144,
+        good_for: "a non-manifold mesh: eight triangles at every edge of the spine",
+        build: || book::build(&book::FULL),
+    },
+    Entry {
+        name: "@book-small",
+        summary: "@book with fewer pages and vertices",
+        frames: 40,
+        vertices: 310,
+        faces: 540,
+        good_for: "tests on non-manifold edges",
+        build: || book::build(&book::SMALL),
+    },
+    Entry {
+        name: "@klein",
+        summary: "a Klein bottle in space whose section turns while it breathes",
+        frames: 36,
+        vertices: 3456,
+        faces: 6912,
+        good_for: "a closed surface with one side: no outward normal, no volume",
+        build: || klein::build(&klein::FULL),
+    },
+    Entry {
+        name: "@klein-small",
+        summary: "@klein with fewer vertices",
+        frames: 36,
+        vertices: 392,
+        faces: 784,
+        good_for: "tests on a surface that cannot be oriented",
+        build: || klein::build(&klein::SMALL),
+    },
+    Entry {
+        name: "@character",
+        summary: "a person who does jumping jacks, bows and twists, and marches in place",
+        frames: 99,
+        vertices: 3835,
+        faces: 7666,
+        good_for: "the size of Cashman & Hormann 2012, Figure 5 and Table 1: V = 3835, n = 99, d = 11505; large turns of limbs",
+        build: || character::build(&character::FULL),
+    },
+    Entry {
+        name: "@character-small",
+        summary: "@character with stouter limbs and fewer vertices, every third frame",
+        frames: 33,
+        vertices: 682,
+        faces: 1360,
+        good_for: "tests of large turns of limbs",
+        build: || character::build(&character::SMALL),
+    },
+    Entry {
+        name: "@trot",
+        summary: "a hound that trots in place for two similar cycles of 16 frames",
+        frames: 32,
+        vertices: 3726,
+        faces: 7448,
+        good_for: "transfer to or from @gallop, by the same joint markers on another connectivity",
+        build: || trot::build(Animal::Hound),
+    },
+    Entry {
+        name: "@trot-small",
+        summary: "@trot with a stouter animal of fewer vertices",
+        frames: 32,
+        vertices: 688,
+        faces: 1372,
+        good_for: "tests of transfer between different connectivities",
+        build: || trot::build(Animal::SmallHound),
+    },
+    Entry {
+        name: "@gallop-poses",
+        summary: "the horse of @gallop at rest and in seven poses of its gallop",
+        frames: 8,
+        vertices: 4082,
+        faces: 8160,
+        good_for: "the source examples of a transfer with m = 7, as in Cashman & Hormann 2012, Figure 7",
+        build: || animals::build_poses(Animal::Horse),
+    },
+    Entry {
+        name: "@gallop-poses-small",
+        summary: "the horse of @gallop-small in the same poses",
+        frames: 8,
+        vertices: 634,
+        faces: 1264,
+        good_for: "tests of transfer by examples",
+        build: || animals::build_poses(Animal::SmallHorse),
+    },
+    Entry {
+        name: "@trot-poses",
+        summary: "the hound of @trot in the poses of @gallop-poses, one by one",
+        frames: 8,
+        vertices: 3726,
+        faces: 7448,
+        good_for: "the target examples of a transfer of @gallop",
+        build: || animals::build_poses(Animal::Hound),
+    },
+    Entry {
+        name: "@trot-poses-small",
+        summary: "the hound of @trot-small in the same poses",
+        frames: 8,
+        vertices: 688,
+        faces: 1372,
+        good_for: "tests of transfer by examples",
+        build: || animals::build_poses(Animal::SmallHound),
+    },
+    Entry {
+        name: "@face",
+        summary: "nine expressions of one face, the neutral one first",
+        frames: 9,
+        vertices: 3200,
+        faces: 6144,
+        good_for: "designing a sequence from poses, as in Cashman & Hormann 2012, Figure 8",
+        build: || face::build(&face::FULL),
+    },
+    Entry {
+        name: "@face-small",
+        summary: "@face with fewer vertices",
+        frames: 9,
+        vertices: 480,
+        faces: 864,
+        good_for: "tests of design from poses",
+        build: || face::build(&face::SMALL),
+    },
+    Entry {
+        name: "@loop",
+        summary: "a rubber ring round which a bulge and a wave run, one whole period",
+        frames: 32,
+        vertices: 2688,
+        faces: 5376,
+        good_for: "looping: the last frame leads into the first",
+        build: || ring::build(&ring::FULL),
+    },
+    Entry {
+        name: "@loop-small",
+        summary: "@loop with fewer vertices",
+        frames: 32,
+        vertices: 396,
+        faces: 792,
+        good_for: "tests of looping, and of a closed surface with a handle",
+        build: || ring::build(&ring::SMALL),
     },
 ];
 
@@ -258,15 +428,20 @@ mod tests {
         }
     }
 
+    /// A motion, and no collection of poses.
+    fn is_film(entry: &Entry) -> bool {
+        !entry.name.contains("-poses") && !entry.name.starts_with("@face")
+    }
+
     #[test]
     fn no_two_consecutive_frames_are_far_apart_or_equal() {
-        for entry in catalogue() {
+        for entry in catalogue().iter().filter(|entry| is_film(entry)) {
             let sequence = embedded(entry.name).unwrap();
             // every third frame of a film is kept there
-            let limit = if entry.name == "@jelly-small" {
-                0.35
-            } else {
-                0.17
+            let limit = match entry.name {
+                "@jelly-small" => 0.35,
+                "@character-small" => 0.5,
+                _ => 0.17,
             };
             for i in 1..sequence.frame_count() {
                 let step = checks::largest_step(&sequence, i) / checks::diagonal(sequence.frame(0));
@@ -280,7 +455,8 @@ mod tests {
     fn small_variants_are_small() {
         for entry in catalogue().iter().filter(|e| e.name.ends_with("-small")) {
             assert!(entry.vertices <= 700, "{}", entry.name);
-            assert!((24..=40).contains(&entry.frames), "{}", entry.name);
+            let frames = if is_film(entry) { 24..=40 } else { 8..=9 };
+            assert!(frames.contains(&entry.frames), "{}", entry.name);
             assert!(
                 catalogue()
                     .iter()

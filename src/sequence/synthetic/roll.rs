@@ -47,7 +47,11 @@ pub const SMALL: Strip = Strip {
 
 /// The angle of frame `frame` (0-based), in radians: 20 degrees a frame, from 0 to 700 degrees.
 pub fn roll_angle(frame: usize) -> f64 {
-    (20.0 * frame as f64).to_radians()
+    roll_degrees(frame).to_radians()
+}
+
+fn roll_degrees(frame: usize) -> f64 {
+    20.0 * frame as f64
 }
 
 /// The strip rolled by `angle` (radians, any sign) in all; vertex (column, row) has the index `column (rows + 1) + row`.
@@ -83,16 +87,37 @@ fn arc(angle: f64, s: f64, strip: &Strip) -> [f64; 2] {
     ]
 }
 
-pub(super) fn build(strip: &Strip, frames: usize) -> Result<Sequence, SyntheticError> {
-    let frames: Vec<_> = (0..frames)
-        .map(|i| roll_strip(roll_angle(i), strip))
+/// One frame for each angle (degrees, any sign, in any order): the strip rolled by it in all, as by [`roll_strip`], faces up where it is flat.
+///
+/// `@roll` is `strip_rolled` of [`FULL`] by 0, 20, ... 700 degrees. Angles must be below a whole turn a column, and columns, rows and angles
+/// at least one. O(V) each.
+pub fn strip_rolled(strip: &Strip, degrees: &[f64]) -> Result<Sequence, SyntheticError> {
+    let (columns, rows) = (strip.columns, strip.rows);
+    if columns == 0 || rows == 0 {
+        return Err(SyntheticError::NoQuads { columns, rows });
+    }
+    if degrees.is_empty() {
+        return Err(SyntheticError::NoFrames);
+    }
+    let limit = 360.0 * columns as f64;
+    if let Some(&degrees) = degrees.iter().find(|d| d.is_nan() || d.abs() >= limit) {
+        return Err(SyntheticError::TooFar { degrees, limit });
+    }
+    let frames: Vec<_> = degrees
+        .iter()
+        .map(|d| roll_strip(d.to_radians(), strip))
         .collect();
     // columns run along x and rows along z, so y would be down: turn the triangles round
-    let faces = grid::faces(strip.columns, strip.rows)
+    let faces = grid::faces(columns, rows)
         .into_iter()
         .map(|[a, b, c]| [a, c, b])
         .collect();
     assemble(faces, &frames)
+}
+
+pub(super) fn build(strip: &Strip, frames: usize) -> Result<Sequence, SyntheticError> {
+    let degrees: Vec<f64> = (0..frames).map(roll_degrees).collect();
+    strip_rolled(strip, &degrees)
 }
 
 #[cfg(test)]
@@ -149,5 +174,40 @@ mod tests {
         }
         let (flat, tiny) = (roll_strip(0.0, &SMALL), roll_strip(1e-9, &SMALL));
         assert!(flat.iter().zip(&tiny).all(|(p, q)| (p - q).norm() < 1e-7));
+    }
+    #[test]
+    fn any_angle_is_an_isometry_with_the_hinges_that_it_says() {
+        let degrees = [0.0, 123.4, 700.0, -360.0];
+        let sequence = strip_rolled(&SMALL, &degrees).unwrap();
+        let stretch = checks::largest_stretch(&sequence, &roll_strip(0.0, &SMALL));
+        assert!(stretch < 1e-12, "{stretch}");
+        let ring = SMALL.rows + 1;
+        for (i, degrees) in degrees.into_iter().enumerate() {
+            let p = checks::points(sequence.frame(i));
+            let along = |c: usize| (p[(c + 1) * ring] - p[c * ring]).xy();
+            for column in 1..SMALL.columns {
+                let (a, b) = (along(column - 1), along(column));
+                let hinge = a.perp(&b).atan2(a.dot(&b)).to_degrees();
+                let expected = degrees / SMALL.columns as f64;
+                assert!((hinge - expected).abs() < 1e-9, "{degrees}: {hinge}");
+            }
+        }
+        let roll = embedded("@roll-small").unwrap();
+        assert_eq!(roll.frame(35), sequence.frame(2));
+    }
+
+    #[test]
+    fn what_cannot_be_rolled_is_refused() {
+        let none = Strip { rows: 0, ..SMALL };
+        let refused = strip_rolled(&none, &[1.0]).unwrap_err().to_string();
+        assert!(refused.contains("40 x 0"), "{refused}");
+        for far in [14400.0, -14400.0, f64::INFINITY, f64::NAN] {
+            let refused = strip_rolled(&SMALL, &[0.0, far]).unwrap_err().to_string();
+            assert!(refused.contains(&far.to_string()), "{refused}");
+            assert!(refused.contains("14400"), "{refused}");
+        }
+        assert!(strip_rolled(&SMALL, &[14399.0]).is_ok());
+        let refused = strip_rolled(&SMALL, &[]).unwrap_err();
+        assert_eq!(refused, SyntheticError::NoFrames);
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::quadruped::Animal;
+use super::body::Body;
 use super::surface_nets::Surface;
 
 /// How much each vertex follows each bone, V x bones row-major; each row sums to 1.
@@ -15,11 +15,11 @@ impl Weights {
     /// Starts from the nearest cone's bone and lets the weights diffuse along the surface over about `reach`.
     ///
     /// As they travel along the surface and not through space, one leg never drags the other along.
-    pub fn new(animal: &Animal, skin: &Surface, spacing: f64, reach: f64) -> Self {
-        let bones = animal.bones.len();
+    pub fn new(body: &Body, skin: &Surface, spacing: f64, reach: f64) -> Self {
+        let bones = body.bones.len();
         let mut values = vec![0.0; skin.points.len() * bones];
         for (row, point) in values.chunks_exact_mut(bones).zip(&skin.points) {
-            row[animal.nearest_bone(point)] = 1.0;
+            row[body.nearest_bone(point)] = 1.0;
         }
         let mut weights = Self { bones, values };
         for _ in 0..(reach / spacing).powi(2).ceil() as usize {

@@ -16,6 +16,42 @@ pub(super) struct Surface {
     pub faces: Vec<[u32; 3]>,
 }
 
+impl Surface {
+    /// Splits longest edges, each in its middle moved to the surface of `solid`, until there are `vertices` of them: O(F) each.
+    pub fn refine(&mut self, solid: &Solid, vertices: usize) {
+        while self.points.len() < vertices {
+            self.split(self.longest_edge(), solid);
+        }
+    }
+
+    /// The first edge of greatest length, in the order of the faces.
+    fn longest_edge(&self) -> [u32; 2] {
+        let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+        let square =
+            |[a, b]: [u32; 2]| (self.points[a as usize] - self.points[b as usize]).norm_squared();
+        let longer = |best: ([u32; 2], f64), edge: [u32; 2]| match square(edge) > best.1 {
+            true => (edge, square(edge)),
+            false => best,
+        };
+        let edges = self.faces.iter().flat_map(sides);
+        edges.fold(([0, 0], 0.0), longer).0
+    }
+
+    fn split(&mut self, [a, b]: [u32; 2], solid: &Solid) {
+        let middle = self.points.len() as u32;
+        let halfway = 0.5 * (self.points[a as usize] + self.points[b as usize]);
+        self.points.push(solid.project(halfway, 2));
+        for face in 0..self.faces.len() {
+            let corners = self.faces[face];
+            if corners.contains(&a) && corners.contains(&b) {
+                let with = |old: u32| corners.map(|v| if v == old { middle } else { v });
+                self.faces[face] = with(a);
+                self.faces.push(with(b));
+            }
+        }
+    }
+}
+
 const NONE: u32 = u32::MAX;
 const RELAXATIONS: usize = 8;
 
@@ -264,8 +300,7 @@ mod tests {
         assert_eq!((0..=255).filter(|&bits| is_one_sheet(bits)).count(), 128);
     }
 
-    #[test]
-    fn a_ball_has_the_area_of_a_ball() {
+    fn ball(spacing: f64) -> (Solid, Surface) {
         let cone = Cone {
             from: Vector3::zeros(),
             to: Vector3::x() * 1e-3,
@@ -274,13 +309,42 @@ mod tests {
             flatten: 1.0,
             blend: 0.1,
         };
-        let surface = polygonise(&Solid { cones: vec![cone] }, 0.1);
+        let solid = Solid { cones: vec![cone] };
+        let surface = polygonise(&solid, spacing);
+        (solid, surface)
+    }
+
+    fn area(surface: &Surface) -> f64 {
         let area = |[a, b, c]: [Vector3<f64>; 3]| 0.5 * (b - a).cross(&(c - a)).norm();
         let triangles = surface
             .faces
             .iter()
             .map(|face| face.map(|v| surface.points[v as usize]));
-        let total: f64 = triangles.map(area).sum();
+        triangles.map(area).sum()
+    }
+
+    #[test]
+    fn a_refined_ball_has_as_many_vertices_as_asked_for_and_stays_a_ball() {
+        let (solid, mut surface) = ball(0.3);
+        let (before, edge) = (surface.points.len(), surface.longest_edge());
+        surface.refine(&solid, before);
+        assert_eq!(surface.longest_edge(), edge);
+        surface.refine(&solid, before + 50);
+        assert_eq!(surface.points.len(), before + 50);
+        assert_eq!(surface.faces.len(), 2 * surface.points.len() - 4);
+        assert!(surface.points.iter().all(|p| solid.value(p).abs() < 1e-6));
+        let outward = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|v| surface.points[v as usize]);
+            (b - a).cross(&(c - a)).dot(&(a + b + c)) > 0.0
+        };
+        assert!(surface.faces.iter().all(outward));
+        let grown = area(&surface) / area(&ball(0.3).1);
+        assert!((1.0..1.05).contains(&grown), "{grown}");
+    }
+
+    #[test]
+    fn a_ball_has_the_area_of_a_ball() {
+        let total = area(&ball(0.1).1);
         assert!(
             (total / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.01,
             "{total}"

@@ -35,7 +35,9 @@ fn stored(contents: &[u8]) -> Vec<u8> {
         produce: Box::new(|sink| sink(contents)),
     };
     let mut bytes = Vec::new();
-    zip_write::write(&mut bytes, &[entry]).unwrap();
+    let mut archive = zip_write::Archive::new(&mut bytes);
+    archive.add(&entry).unwrap();
+    archive.finish().unwrap();
     bytes
 }
 

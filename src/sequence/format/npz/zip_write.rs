@@ -27,15 +27,32 @@ struct Written {
     at: u64,
 }
 
-/// Writes the entries and their directory. Every entry is produced twice: for its checksum and to be written.
-pub(super) fn write(out: &mut impl Write, entries: &[Entry]) -> io::Result<()> {
-    write_from(out, entries, LARGE)
+/// An archive that grows by an entry at a time.
+pub(super) struct Archive<W> {
+    out: W,
+    at: u64,
+    entries: u64,
+    directory: Vec<u8>,
+    large: u64,
 }
 
-fn write_from(out: &mut impl Write, entries: &[Entry], large: u64) -> io::Result<()> {
-    let mut at = 0;
-    let mut directory = Vec::new();
-    for entry in entries {
+impl<W: Write> Archive<W> {
+    pub(super) fn new(out: W) -> Self {
+        Self::with_threshold(out, LARGE)
+    }
+
+    fn with_threshold(out: W, large: u64) -> Self {
+        Self {
+            out,
+            at: 0,
+            entries: 0,
+            directory: Vec::new(),
+            large,
+        }
+    }
+
+    /// The entry is produced twice: for its checksum and to be written.
+    pub(super) fn add(&mut self, entry: &Entry) -> io::Result<()> {
         let mut crc = Crc::new();
         (entry.produce)(&mut |part| {
             crc.update(part);
@@ -45,21 +62,24 @@ fn write_from(out: &mut impl Write, entries: &[Entry], large: u64) -> io::Result
             name: entry.name.clone(),
             length: entry.length,
             crc: crc.sum(),
-            at,
+            at: self.at,
         };
-        let header = written.local_header(large);
-        out.write_all(&header)?;
-        (entry.produce)(&mut |part| out.write_all(part))?;
-        at += header.len() as u64 + entry.length;
-        directory.extend(written.directory_entry(large));
+        let header = written.local_header(self.large);
+        self.out.write_all(&header)?;
+        (entry.produce)(&mut |part| self.out.write_all(part))?;
+        self.at += header.len() as u64 + entry.length;
+        self.entries += 1;
+        self.directory.extend(written.directory_entry(self.large));
+        Ok(())
     }
-    out.write_all(&directory)?;
-    out.write_all(&end(
-        entries.len() as u64,
-        directory.len() as u64,
-        at,
-        large,
-    ))
+
+    /// Writes the directory.
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        self.out.write_all(&self.directory)?;
+        let size = self.directory.len() as u64;
+        self.out
+            .write_all(&end(self.entries, size, self.at, self.large))
+    }
 }
 
 impl Written {
@@ -176,7 +196,10 @@ mod tests {
                 produce: Box::new(|sink| sink(&array)),
             };
             let mut bytes = Vec::new();
-            write_from(&mut bytes, &[entry("a.npy"), entry("ä.npy")], large).unwrap();
+            let mut archive = Archive::with_threshold(&mut bytes, large);
+            archive.add(&entry("a.npy")).unwrap();
+            archive.add(&entry("ä.npy")).unwrap();
+            archive.finish().unwrap();
             let mut archive = npyz::npz::NpzArchive::new(Cursor::new(bytes)).unwrap();
             for name in ["a", "ä"] {
                 let read = archive.by_name(name).unwrap().unwrap();

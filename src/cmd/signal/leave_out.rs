@@ -5,13 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::output::{check_place, draft_json, say};
-use super::{FrameChoice, Outcome};
+use super::check_between;
+use crate::cmd::output::{check_place, draft_json, say};
+use crate::cmd::{FrameChoice, Outcome};
 use crate::mesh::measure::bounds;
-use crate::shape::{SpaceKind, prepare};
+use crate::shape::{SpaceKind, prepare_for};
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
-use crate::signal::leave_out::LeaveOut;
+use crate::signal::leave_out::{LeaveOut, Split, TradeOff};
+use crate::signal::refine::RefineOptions;
+
+pub const EXAMPLES: &str = "Example: meshseq signal leave-out @gallop-small --json leave-out.json";
 
 #[derive(Args)]
 pub struct LeaveOutVerb {
@@ -19,7 +23,7 @@ pub struct LeaveOutVerb {
     sequence: String,
     #[command(flatten)]
     frames: FrameChoice,
-    /// Shape space: vertex, gradient or lric; its reference is the first frame
+    /// Shape space: vertex, gradient, lric or patch; its reference is the first frame
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// How knots average parameters: symmetric or literal
@@ -42,6 +46,12 @@ pub struct LeaveOutVerb {
         allow_negative_numbers = true
     )]
     shares: Vec<f64>,
+    /// Test each fit a second time, with the error of the whole chain lowered jointly
+    #[arg(long)]
+    refine: bool,
+    /// With --refine: weight of the frames half-way between frames, beside 1 for a frame
+    #[arg(long, value_name = "W", default_value_t = RefineOptions::default().between, requires = "refine", allow_negative_numbers = true)]
+    between: f64,
     /// Write the numbers to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -62,21 +72,28 @@ impl LeaveOutVerb {
         if let Some(share) = self.shares.iter().find(|s| !(**s > 0.0 && **s <= 1.0)) {
             return Err(format!("--shares {share}: expected shares above 0, at most 1").into());
         }
-        if let Some(path) = &self.json {
-            check_place(path)?;
-        }
+        check_between(self.between)?;
+        self.json.as_deref().map_or(Ok(()), check_place)?;
         let sequence = self.frames.open(&self.sequence)?;
         let size = bounds(sequence.frame(0)).diagonal();
-        let space = prepare(kind, sequence.connectivity().clone(), sequence.frame(0))?;
-        let test = LeaveOut::new(&*space, sequence.positions())?;
+        let split = Split::new(sequence.positions(), sequence.dimension())?;
+        let space = prepare_for(kind, sequence.connectivity(), &split.kept)?;
+        let test = LeaveOut::new(&*space, &split)?;
+        let refinement = RefineOptions {
+            between: self.between,
+            ..RefineOptions::default()
+        };
+        let stages: &[bool] = if self.refine {
+            &[false, true]
+        } else {
+            &[false]
+        };
         let mut fits = Vec::new();
         for &layout in &layouts {
-            for row in test.trade_off(&self.shares, layout, knots)? {
-                let (k, l, m) = row.klm;
-                fits.push(json!({
-                    "layout": layout.to_string(), "layout_weight": row.weight, "share": row.share, "k": k, "l": l, "m": m,
-                    "rms_relative": relative(row.missed, size), "error_g": row.errors.g, "error_psi": row.errors.psi,
-                }));
+            for &refined in stages {
+                let how = refined.then_some(&refinement);
+                let rows = test.trade_off(&self.shares, layout, knots, how)?;
+                fits.extend(rows.iter().map(|row| numbers(row, layout, refined, size)));
             }
         }
         let numbers = json!({
@@ -91,6 +108,14 @@ impl LeaveOutVerb {
         say(&describe(&self.sequence, &numbers));
         Ok(true)
     }
+}
+
+fn numbers(row: &TradeOff, layout: Layout, refined: bool, size: f64) -> Value {
+    let (k, l, m) = row.klm;
+    json!({
+        "layout": layout.to_string(), "layout_weight": row.weight, "refined": refined, "share": row.share, "k": k, "l": l, "m": m,
+        "rms_relative": relative(row.missed, size), "error_g": row.errors.g, "error_psi": row.errors.psi,
+    })
 }
 
 fn relative(rms: f64, size: f64) -> f64 {
@@ -111,9 +136,14 @@ fn describe(name: &str, v: &Value) -> String {
     ];
     for fit in v["signals"].as_array().into_iter().flatten() {
         lines.push(format!(
-            "{:12}{:8.3}%  k = {}, l = {}, m = {}, weight {}; (2) {:.5}",
+            "{:12}{:8.3}%  {}k = {}, l = {}, m = {}, weight {}; (2) {:.5}",
             fit["layout"].as_str().unwrap_or(""),
             percent(&fit["rms_relative"]),
+            if fit["refined"] == true {
+                "refined, "
+            } else {
+                ""
+            },
             fit["k"],
             fit["l"],
             fit["m"],

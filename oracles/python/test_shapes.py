@@ -1,0 +1,372 @@
+"""Closed forms for the oracles of shape spaces: surfaces whose edges, angles and rotations are known without measuring them. Run by test_oracles.py.
+
+Nothing here comes from shape_mesh.py or another oracle: what is expected is written out, or made with the few lines below.
+"""
+
+import numpy as np
+
+from checking import Oracle, check, close
+
+RT2 = np.sqrt(2)
+NEEDLE = np.array([[4, 2, 0]])  # three vertices of a flat strip on one line: a degenerate triangle
+
+
+def turning(r):
+    """The rotation of a rotation vector, by Rodrigues' formula."""
+    r = np.asarray(r, float)
+    angle = np.linalg.norm(r)
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = r / angle
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def strip(cells, angle=0.0):
+    """A row of unit squares, two triangles each, rolled by `angle` from square to square, away from the normal +z of the first: each of the edges
+    between two squares is convex, and square i is turned by i times the angle about +y."""
+    headings = angle * np.arange(cells)
+    row = np.zeros((cells + 1, 3))
+    row[1:] = np.cumsum(np.column_stack([np.cos(headings), np.zeros(cells), -np.sin(headings)]), axis=0)
+    corners = 2 * np.arange(cells)[:, None]
+    x = np.stack([row, row + [0, 1, 0]], axis=1).reshape(-1, 3)
+    return x, np.concatenate([corners + [0, 2, 3], corners + [0, 3, 1]], axis=1).reshape(-1, 3)
+
+
+def rigid(x, r, shift):
+    return x @ turning(r).T + shift
+
+
+TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+SPIN, SHIFT = np.array([0.5, -1.1, 0.7]), np.array([3.0, -2, 5])
+
+
+def book(*angles):
+    """A page in the plane z = 0 on the spine from 0 to 1, and pages at these dihedral angles to it, which run along the spine the other way."""
+    away = [[np.zeros(1), [-np.cos(a)], [-np.sin(a)]] for a in angles]
+    x = np.vstack([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], np.reshape(away, (-1, 3))])
+    return x, np.array([[0, 1, 2]] + [[1, 0, 3 + i] for i in range(len(angles))])
+
+
+def world(rng, degenerate=True):
+    """Two strips, a vertex of no triangle, and a triangle that is degenerate in the reference; frames of it, each strip moved and bent by itself."""
+    (x, F), (y, G) = strip(3), strip(2)
+    faces = np.concatenate([F, NEEDLE[: int(degenerate)], G + len(x) + 1])
+    reference = np.concatenate([x**2, [[7.0, 7, 7]], y**2 + [0, 5, 0]])  # squared, so that areas differ
+    frames = []
+    for _ in range(3):
+        parts = [rigid(strip(n, rng.uniform(-1, 1))[0], rng.normal(size=3), rng.normal(size=3)) for n in (3, 2)]
+        frame = np.concatenate([parts[0], rng.normal(size=(1, 3)), parts[1]])
+        frames.append(frame + 0.05 * rng.normal(size=frame.shape))
+    return {"reference": reference, "F": faces}, np.array(frames)
+
+
+def diagonal(x):
+    return np.linalg.norm(np.ptp(x, axis=0))
+
+
+def gradient_z(x0, rotation_vectors, six, x):
+    """z of one component, from what all or each of its triangles have."""
+    triangles = np.concatenate([np.atleast_2d(rotation_vectors), np.atleast_2d(six)], axis=1)
+    return np.concatenate([triangles.ravel(), x.mean(axis=0) / diagonal(x0)])
+
+
+def check_gradient_encode(program, oracle, rng):
+    def encode(x0, F, x):
+        return oracle.run(reference=x0, F=F, frames=x[None])["z"][0]
+
+    still = [1, 1, 1, 0, 0, 0]
+    x0, F = TETRAHEDRON
+    for r in (SPIN, [0, 0, 0], [0, 3.1, 0], [1e-9, 0, 0]):
+        moved = rigid(x0, r, SHIFT)
+        name = f"{program}: rotation vectors of a rigid motion by {np.linalg.norm(r):.2g}"
+        close(name, encode(x0, F, moved), gradient_z(x0, [r] * 4, [still] * 4, moved))
+    grown = 3 * rigid(x0, SPIN, SHIFT)
+    close(f"{program}: turned and scaled", encode(x0, F, grown), gradient_z(x0, [SPIN] * 4, [[3, 3, 3, 0, 0, 0]] * 4, grown), 1e-10)
+
+    flat, F = strip(2)
+    pulled = flat @ np.array([[2.0, 0.5, 0], [0.5, 1, 0], [0, 0, 1]])  # area times 1.75, so the normal's column times its root
+    six = [2, 1, np.sqrt(1.75), 0, 0, RT2 / 2]
+    close(f"{program}: a pull in a plane", encode(flat, F, pulled), gradient_z(flat, [[0] * 3] * 4, [six] * 4, pulled))
+    upright = turning([0, np.pi / 2, 0]).T  # x to -z: the pull is then in y and z
+    z = encode(flat @ upright, F, pulled @ upright)
+    close(f"{program}: the order of the six", z, gradient_z(flat, [[0] * 3] * 4, [[np.sqrt(1.75), 1, 2, -RT2 / 2, 0, 0]] * 4, pulled @ upright))
+    flat, F = strip(4)
+    rolled = strip(4, 0.7)[0]
+    headings = np.repeat(0.7 * np.arange(4), 2)
+    close(f"{program}: a roll", encode(flat, F, rolled), gradient_z(flat, headings[:, None] * [0, 1, 0], [still] * 8, rolled))
+
+    inputs, frames = world(rng)
+    z = oracle.run(**inputs, frames=frames)["z"]
+    close(f"{program}: a degenerate triangle is at rest", z[:, 54:63], [[0, 0, 0, *still]] * 3)
+    centres = [[x[:8].mean(axis=0), x[8], x[9:].mean(axis=0)] for x in frames]
+    close(f"{program}: centres of components, by lowest vertex", z[:, -9:], np.reshape(centres, (3, 9)) / diagonal(inputs["reference"]))
+    check(f"{program}: a face without its vertex", oracle.status(reference=flat, F=F + 99, frames=flat[None]) == "error")
+
+
+def check_gradient_decode(program, oracle, rng):
+    decode = {"stage": "shape.gradient_decode"}
+    x0, F = TETRAHEDRON
+    x = 3 * rigid(x0, SPIN, SHIFT)
+    z = gradient_z(x0, [SPIN] * 4, [[3, 3, 3, 0, 0, 0]] * 4, x)
+    close(f"{program}: decodes a turn and a scale", oracle.run(**decode, reference=x0, F=F, z=z[None])["frames"], x[None])
+    flat, F = strip(4)
+    headings = np.repeat(0.7 * np.arange(4), 2)
+    z = gradient_z(flat, headings[:, None] * [0, 1, 0], [[1, 1, 1, 0, 0, 0]] * 8, strip(4, 0.7)[0])
+    close(f"{program}: decodes a roll", oracle.run(**decode, reference=flat, F=F, z=z[None])["frames"], strip(4, 0.7)[0][None])
+
+    inputs, frames = world(rng)
+    z = oracle.run(**inputs, frames=frames)["z"]
+    found = oracle.run(**decode, **inputs, z=z)["frames"]
+    close(f"{program}: decodes what it encodes", found, frames)
+    mixed = (z[0] + z[1] + z[2]) / 3
+    found = oracle.run(**decode, **inputs, z=mixed[None])["frames"][0]
+    close(f"{program}: decodes a mean of three by least squares", found, dense_gradient_decode(inputs, mixed), 1e-10)
+
+
+def dense_gradient_decode(inputs, z):
+    """The world's x by a dense least-squares problem, two rows an edge of every triangle: x (e1 e2) (e1 e2)^+ = T (e1 e2) (e1 e2)^+."""
+    x0, F = inputs["reference"], inputs["F"]
+    rows, right = [], []
+    for f, (a, b, c) in enumerate(F):
+        edges = np.stack([x0[b] - x0[a], x0[c] - x0[a]], axis=1)
+        size = np.linalg.norm(np.cross(*edges.T))
+        if size < 1e-9:
+            continue
+        r, s = z[9 * f : 9 * f + 3], z[9 * f + 3 : 9 * f + 9]
+        T = turning(r) @ np.array([[s[0], s[5] / RT2, s[4] / RT2], [s[5] / RT2, s[1], s[3] / RT2], [s[4] / RT2, s[3] / RT2, s[2]]])
+        inverse = np.linalg.pinv(edges)
+        row = np.zeros((3, len(x0)))
+        row[:, b], row[:, c] = inverse
+        row[:, a] = -inverse.sum(axis=0)
+        rows.append(np.sqrt(size) * row)
+        right.append(np.sqrt(size) * (T @ edges @ inverse).T)
+    x = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=1e-12)[0]
+    for part, centre in zip((slice(0, 8), slice(8, 9), slice(9, None)), z[9 * len(F) :].reshape(3, 3)):
+        x[part] += centre * diagonal(x0) - x[part].mean(axis=0)
+    return x
+
+
+def test_gradient(rng):
+    for program in ("shape_gradient_numpy planar", "shape_gradient_numpy", "shape_gradient_scipy", "shape_gradient_libigl"):
+        with Oracle(program, "shape.gradient_encode") as oracle:
+            check_gradient_encode(program, oracle, rng)
+            if "numpy" not in program:
+                check_gradient_decode(program, oracle, rng)
+    with Oracle("shape_gradient_numpy planar", "shape.gradient_encode") as oracle:
+        flat, F = strip(1)
+        check("shape_gradient_numpy planar: a collapsed triangle", oracle.status(reference=flat, F=F, frames=flat[None] * [1, 0, 1]) == "unsupported")
+
+
+def fold(angle):
+    """Two triangles of one outward side: (0,1,2) in the plane z = 0, and (1,0,3) at this dihedral angle; five edges."""
+    return book(angle)
+
+
+def check_lengths_encode(program, encode, rng, books=True, turned_over=True, near=1e-11):
+    """`encode` (x0, F, frames) gives z, or None where the engine has not got it; `near` is for angles near 0 and pi."""
+    flat, F = fold(0)
+    unit = (3 + 2 * RT2) / 5  # edges 01, 02, 03, 12, 13
+    edges = np.array([1, 1, 1, RT2, RT2]) / unit
+    for angle in (0.0, 0.8, -0.8, 3.1, -3.1):
+        z = encode(flat, F, fold(angle)[0][None])[0]
+        close(f"{program}: lengths of a fold of {angle}", z[:10:2], edges)
+        close(f"{program}: dihedral angles of it", z[1:10:2], [angle, 0, 0, 0, 0], near)
+        close(f"{program}: its place", z[10:], [0, 0, 0, *fold(angle)[0].mean(axis=0) / diagonal(flat)])
+    z = encode(flat, F[:, ::-1], fold(0.8)[0][None])[0]
+    close(f"{program}: seen from behind, the fold is concave", z[1], -0.8)
+    z = encode(flat, np.concatenate([F[:1], F[1:, ::-1]]), fold(0.8)[0][None])
+    if turned_over:
+        close(f"{program}: of two triangles of opposite orientation, the second is turned over", z[0, 1], 0.8)
+    else:
+        check(f"{program}: triangles of opposite orientation are unsupported", z is None)
+    z = encode(flat, F[:, [1, 2, 0]], fold(0.8)[0][None])[0]
+    close(f"{program}: corners of a triangle may start anywhere", z[:10], encode(flat, F, fold(0.8)[0][None])[0][:10])
+
+    x0, F = TETRAHEDRON
+    z = encode(x0, F, 2 * rigid(x0, SPIN, SHIFT)[None])[0]
+    close(f"{program}: a tetrahedron twice as large", z[:12:2], np.full(6, 2.0))
+    close(f"{program}: its angles are convex", z[1:12:2], np.full(6, np.arccos(-1 / 3)))
+    close(f"{program}: its rotation, and its centre", z[12:], [*SPIN, *2 * rigid(x0, SPIN, SHIFT).mean(axis=0) / diagonal(x0)])
+
+    (flat, F), angles = strip(5), np.array([0.4, -0.6])
+    rolls = np.array([strip(5, a)[0] for a in angles])
+    z = encode(flat, F, rolls)
+    kinds = edge_kinds(F)
+    lengths = np.array([{"ladder": 1, "side": 1, "brace": RT2}[kind] for kind in kinds])
+    close(f"{program}: a roll keeps its lengths", z[:, : 2 * len(kinds) : 2], [lengths / lengths.mean()] * 2)
+    bends = [[a if kind == "ladder" and 0 < i < 5 else 0 for kind, i in zip(kinds, edge_columns(F))] for a in angles]
+    close(f"{program}: a roll's angles", z[:, 1 : 2 * len(kinds) : 2], bends, near)
+
+    inputs, frames = world(rng, degenerate=False)
+    z = encode(inputs["reference"], inputs["F"], frames)
+    edges = edge_list(inputs["F"])
+    measured = np.linalg.norm(frames[:, edges[:, 1]] - frames[:, edges[:, 0]], axis=2)
+    mean = np.linalg.norm(inputs["reference"][edges[:, 1]] - inputs["reference"][edges[:, 0]], axis=1).mean()
+    close(f"{program}: edges in ascending order, over two components", z[:, : 2 * len(edges) : 2], measured / mean)
+    lone = z[:, 2 * len(edges) + 6 :][:, :6]
+    close(f"{program}: a vertex by itself", lone, np.column_stack([np.zeros((3, 3)), frames[:, 8] / diagonal(inputs["reference"])]))
+
+    x0, F = book(0, 0.9, -1.2)
+    x = book(0.3, 0.9, -1.2)[0]
+    found = encode(x0, F, x[None])
+    if books:
+        close(f"{program}: a book's spine, then zeros", found[0, :6], [1 / mean_length(x0, F), 0.3, 0.9, -1.2, 1 / mean_length(x0, F), 0])
+    else:
+        check(f"{program}: a book is unsupported", found is None)
+
+
+def edge_list(F):
+    return np.unique(np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0)
+
+
+def mean_length(x, F):
+    i, j = edge_list(F).T
+    return np.linalg.norm(x[j] - x[i], axis=1).mean()
+
+
+def edge_kinds(F):
+    """Of a strip's edges: those across it, those along its sides, and the diagonals of its squares."""
+    return ["ladder" if j == i + 1 else "side" if j == i + 2 else "brace" for i, j in edge_list(F)]
+
+
+def edge_columns(F):
+    return edge_list(F)[:, 0] // 2
+
+
+def test_lengths_encode(rng):
+    limits = {"numpy": {}, "libigl": {"books": False, "turned_over": False}, "trimesh": {"books": False, "near": 3e-8}}
+    for library, known in limits.items():
+        with Oracle(f"shape_lengths_{library}", "shape.lengths_encode") as oracle:
+
+            def encode(x0, F, frames):
+                reply = oracle.request(reference=x0, F=F, frames=frames)
+                return None if reply["status"] == "unsupported" else reply["out.z"]
+
+            check_lengths_encode(f"shape_lengths_{library}", encode, rng, **known)
+            flat, F = strip(2)
+            z = oracle.run(reference=flat, F=np.concatenate([F, NEEDLE]), frames=flat[None])["z"]
+            close(f"shape_lengths_{library}: a degenerate triangle has lengths and no angles", z[0, 1:20:2], np.zeros(10), known.get("near", 1e-11))
+            collapsed = oracle.status(reference=flat, F=F, frames=flat[None] * [1, 0, 1])
+            check(f"shape_lengths_{library}: a collapsed triangle", collapsed == "unsupported")
+
+
+def test_lengths_decode(rng):
+    with Oracle("shape_lengths_numpy", "shape.lengths_encode") as encoder, Oracle("shape_lengths_scipy", "shape.lengths_decode") as decoder:
+        angle, (flat, F) = 0.7, strip(4)
+        rolled = rigid(strip(4, angle)[0], SPIN, SHIFT)
+        kinds, columns = edge_kinds(F), edge_columns(F)
+        lengths = np.array([RT2 if kind == "brace" else 1 for kind in kinds])
+        bends = [angle if kind == "ladder" and 0 < i < 4 else 0 for kind, i in zip(kinds, columns)]
+        z = np.concatenate([np.column_stack([lengths / lengths.mean(), bends]).ravel(), SPIN, rolled.mean(axis=0) / diagonal(flat)])
+        close("shape_lengths_scipy: decodes a roll written by hand", decoder.run(reference=flat, F=F, z=z[None])["frames"], rolled[None], 1e-10)
+        turned = z.copy()
+        turned[1 : 2 * len(kinds) : 2] += 2 * np.pi
+        close("shape_lengths_scipy: whole turns do not matter", decoder.run(reference=flat, F=F, z=turned[None])["frames"], rolled[None], 1e-10)
+        for name, (inputs, frames) in {"a world": world(rng), "a book": book_frames()}.items():
+            z = encoder.run(**inputs, frames=frames)["z"]
+            close(f"shape_lengths: decodes {name} it encodes", decoder.run(**inputs, z=z)["frames"], frames, 1e-10)
+        tetrahedron, F = TETRAHEDRON
+        z = encoder.run(reference=tetrahedron, F=F, frames=tetrahedron[None])["z"]
+        z[0, 1:12:2] = 2.1  # angles of no tetrahedron of these lengths: by symmetry its edges become other, but equal
+        x = decoder.run(reference=tetrahedron, F=F, z=z)["frames"][0]
+        i, j = edge_list(F).T
+        sizes = np.linalg.norm(x[j] - x[i], axis=1)
+        close("shape_lengths_scipy: angles that cannot be leave lengths alone where all angles pull alike", sizes, np.full(6, np.sqrt(8)), 1e-8)
+
+
+def book_frames():
+    x0, F = book(0, 0.9, -1.2)
+    return {"reference": x0, "F": F}, np.array([book(0.3, 1.0, -2.0)[0], rigid(x0, SPIN, SHIFT)])
+
+
+def test_lric(rng):
+    with Oracle("shape_lric_numpy", "shape.lric_encode") as oracle:
+        decode = {"stage": "shape.lric_decode"}
+        flat, F = fold(0)
+        for angle in (0.0, 0.8, -0.8):
+            x = 2 * rigid(fold(angle)[0], SPIN, SHIFT)
+            z = oracle.run(reference=flat, F=F, frames=x[None])["z"]
+            # half-edges 01, 12, 20 of one triangle and 10, 03, 31 of the other hold 2, 2, 0; the edges are 01, 02, 03, 12, 13
+            expected = [2, 2, angle, 0, 0, 0, 2, 0, 0, 2, 0, 0, 0, 0, 0, *SPIN, *x.mean(axis=0) / diagonal(flat)]
+            close(f"lric: a fold of {angle}, twice as large and turned", z[0], expected)
+            close(f"lric: decodes the fold of {angle}", oracle.run(**decode, reference=flat, F=F, z=np.array([expected]))["frames"], x[None])
+
+        right = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        pulled = right @ np.array([[2.0, 0.5, 0], [0.5, 1, 0], [0, 0, 1]])
+        z = oracle.run(reference=right, F=np.array([[0, 1, 2]]), frames=pulled[None])["z"][0]
+        close("lric: the stretch of a triangle at its half-edges", z[:12], [2, 0, 0, RT2 / 2, 0, 0, 1, 0, 0, 0, 0, 0])
+        z = oracle.run(reference=right, F=np.array([[1, 2, 0]]), frames=pulled[None])["z"][0]
+        # along (-1,1)/sqrt2 and (-1,-1)/sqrt2: U11 = 1 and U22 = 2, U12 = 1/2
+        close("lric: the stretch in axes along e1", z[:9], [RT2 / 2, 0, 0, 2, 0, 0, 1, 0, 0], 1e-12)
+
+        flat, F = strip(4)
+        rolled = strip(4, 0.7)[0]
+        z = oracle.run(reference=flat, F=F, frames=rolled[None])["z"][0]
+        kinds, columns = edge_kinds(F), edge_columns(F)
+        inner = [i for i, kind in enumerate(kinds) if kind == "brace" or kind == "ladder" and 0 < columns[i] < 4]
+        close("lric: a roll's angles", [z[3 * i + 2] for i in inner], [0.7 if kinds[i] == "ladder" else 0 for i in inner])
+        for name, (inputs, frames) in {"a world": world(rng), "a book": book_frames()}.items():
+            z = oracle.run(**inputs, frames=frames)["z"]
+            close(f"lric: decodes {name} it encodes", oracle.run(**decode, **inputs, z=z)["frames"], frames, 1e-10)
+        x0, F = book(0, 0.9, -1.2)
+        spine = oracle.run(reference=x0, F=F, frames=book(0.3, 1, -2)[0][None])["z"][0]
+        close("lric: a book's spine: four stretches, then three angles", spine[:7], [1, 1, 1, 1, 0.3, 1, -2])
+        bow = np.array([[0, 1, 2], [0, 3, 4]]), np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, 1, 0]])
+        d = oracle.run(reference=bow[1], F=bow[0], frames=bow[1][None])["z"]
+        check("lric: triangles that only a vertex joins", oracle.status(**decode, reference=bow[1], F=bow[0], z=d) == "unsupported")
+        twice = oracle.status(reference=right, F=np.array([[0, 1, 1]]), frames=right[None])
+        check("lric: a triangle that names a vertex twice", twice == "unsupported")
+
+
+def test_patch(rng):
+    with Oracle("shape_patch_numpy", "shape.patch_encode") as oracle:
+        decode = {"stage": "shape.patch_decode"}
+        still = [0, 0, 0, 1, 1, 1, 0, 0, 0]
+        x0, F = TETRAHEDRON
+        moved = rigid(x0, SPIN, SHIFT)
+        inputs = {"reference": x0, "F": F, "patches": np.zeros(4, int)}
+        expected = np.array([still * 4 + [*SPIN, *moved.mean(axis=0) / diagonal(x0)]])
+        close("patch: one patch, moved", oracle.run(**inputs, frames=moved[None])["z"], expected)
+        close("patch: one patch, decoded", oracle.run(**decode, **inputs, z=expected)["frames"], moved[None])
+
+        flat, F = fold(0)
+        flat[3, 1] = -2  # the second triangle has twice the area of the first
+        bent = flat.copy()
+        bent[3] = turning([0.9, 0, 0]) @ flat[3]
+        turn = np.angle(1 + 2 * np.exp(0.9j))
+        expected = [-turn, 0, 0, *still[3:], 0.9 - turn, 0, 0, *still[3:], turn, 0, 0, *bent.mean(axis=0) / diagonal(flat)]
+        z = oracle.run(reference=flat, F=F, patches=np.zeros(2, int), frames=bent[None])["z"]
+        close("patch: areas weigh the mean of rotations", z[0], expected)
+
+        flat, F = strip(6)
+        rolled = rigid(strip(6, 0.4)[0], SPIN, SHIFT)
+        inputs = {"reference": flat, "F": F, "patches": np.repeat([1, 0, 2], 4)}  # two squares each; the lowest patch is the middle one
+        bend = turning([0, 0.2, 0])  # from the middle of a patch to the second of its squares
+        back, forth = [0, -0.2, 0, *still[3:]], [0, 0.2, 0, *still[3:]]
+        first = rotation_vector(turning(SPIN) @ turning([0, 0.8, 0]) @ bend)  # of patch 0: the mean of squares 2 and 3
+        pairs = [[0, -0.8, 0], [0, 0.8, 0]]  # (0,1), (0,2)
+        centre = rolled.mean(axis=0) / diagonal(flat)
+        expected = np.concatenate([np.tile(back * 2 + forth * 2, 3), np.ravel(pairs), first, centre])[None]
+        close("patch: three patches of a roll", oracle.run(**inputs, frames=rolled[None])["z"], expected)
+        close("patch: decodes the roll written by hand", oracle.run(**decode, **inputs, z=expected)["frames"], rolled[None])
+
+        inputs, frames = world(rng)
+        inputs["patches"] = np.array([0, 0, 2, 2, 2, 2, -1, 1, 1, 1, 1])
+        z = oracle.run(**inputs, frames=frames)["z"]
+        close("patch: decodes the world it encodes", oracle.run(**decode, **inputs, z=z)["frames"], frames, 1e-10)
+        across = inputs | {"patches": np.array([0, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0])}
+        check("patch: a patch over two components", oracle.status(**across, frames=frames) == "error")
+
+
+def rotation_vector(R):
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return axis / np.linalg.norm(axis) * np.arccos((np.trace(R) - 1) / 2)
+
+
+def run(rng):
+    test_gradient(rng)
+    test_lengths_encode(rng)
+    test_lengths_decode(rng)
+    test_lric(rng)
+    test_patch(rng)

@@ -1,0 +1,73 @@
+//! What `transfer` and `design` write: frames, and the representation that they were sampled from.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+
+use super::super::Failure;
+use super::super::output::{check_place, draft_json};
+use super::sample::frames_at;
+use crate::mesh::orientation::Orientation;
+use crate::sequence::format::write;
+use crate::signal::file::{Stored, save};
+
+#[derive(Args)]
+pub struct Outputs {
+    /// Frames go here: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    #[arg(short, long, value_name = "OUT")]
+    pub out: PathBuf,
+    /// Write the representation to this .npz, for `signal sample` and `signal edit`
+    #[arg(long, value_name = "FILE")]
+    rep: Option<PathBuf>,
+    /// Write the numbers to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Refuses places that nothing could be written to; to be asked before long work.
+    pub fn check(&self) -> Result<(), Failure> {
+        if let Some(rep) = &self.rep {
+            super::check_representation_place(rep)?;
+            if rep == &self.out {
+                let place = rep.display();
+                return Err(format!(
+                    "{place}: -o and --rep name one file; frames and representation are two"
+                )
+                .into());
+            }
+        }
+        Ok(self.json.as_deref().map_or(Ok(()), check_place)?)
+    }
+
+    /// Writes everything; `numbers` are those of the verb, to which faces are added that are inside out beside the first of `examples` (3V positions each)
+    /// though they are not in any of the examples.
+    pub fn write(
+        &self,
+        stored: &Stored,
+        examples: &[f64],
+        mut numbers: Value,
+    ) -> Result<Value, Failure> {
+        let n = stored.representation.time.frame_count();
+        let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+        let sequence = frames_at(stored, &times, Path::new("the new representation"))?;
+        let faces = sequence.connectivity().faces();
+        let orientation = Orientation::new(&examples[..sequence.dimension()], faces);
+        let before = orientation.turned_in_any(examples);
+        let turned = orientation.newly_turned(sequence.positions(), &before);
+        numbers["faces_turned"] = turned.iter().map(Vec::len).sum::<usize>().into();
+        numbers["faces_turned_in_examples"] = before.len().into();
+        numbers["turned"] = turned.into();
+        let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
+        let json = json.transpose()?;
+        write(&sequence, &self.out)?;
+        if let Some(rep) = &self.rep {
+            save(stored, rep)?;
+        }
+        if let Some(json) = json {
+            json.keep()?;
+        }
+        Ok(numbers)
+    }
+}

@@ -1,0 +1,131 @@
+//! `signal sample` (section 4.2).
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::super::output::{check_place, draft_json, say};
+use super::super::{Failure, Outcome, whole};
+use super::tables::{numbers, pairs, read_text};
+use crate::sequence::Sequence;
+use crate::sequence::format::write;
+use crate::signal::file::{Stored, load};
+use crate::signal::resample::{at_rate, check, evenly, warped};
+
+pub const EXAMPLES: &str = "Examples:
+  meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
+  meshseq signal sample gallop.npz --rate 1.5 -o half-again-as-many
+  printf 'frame,time\\n1,1\\n30,12\\n36,24\\n' > slow-then-fast.csv
+  meshseq signal sample gallop.npz --warp slow-then-fast.csv -o warped.npz";
+
+#[derive(Args)]
+pub struct SampleVerb {
+    /// A representation that `signal fit` wrote
+    representation: PathBuf,
+    /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
+    #[arg(long, alias = "count", value_name = "N", allow_negative_numbers = true, value_parser = whole("1 or more"))]
+    frames: Option<usize>,
+    /// Frames in place of one: 1.5 for three in place of two
+    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["frames", "times", "warp"])]
+    rate: Option<f64>,
+    /// Frame times in [1, n] in any order: numbers separated by commas, or a file of them
+    #[arg(
+        long,
+        value_name = "T,T,..|FILE",
+        allow_hyphen_values = true,
+        conflicts_with_all = ["frames", "warp"]
+    )]
+    times: Option<String>,
+    /// CSV of slow and fast motion: frame (of the new sequence), time (of the old); with a header line
+    #[arg(long, value_name = "FILE", conflicts_with = "frames")]
+    warp: Option<PathBuf>,
+    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    #[arg(short, long, value_name = "OUT")]
+    out: PathBuf,
+    /// Write the numbers to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl SampleVerb {
+    pub fn run(self) -> Outcome {
+        self.json.as_deref().map_or(Ok(()), check_place)?;
+        let stored = load(&self.representation)?;
+        let times = self.times(stored.representation.time.frame_count())?;
+        let sequence = frames_at(&stored, &times, &self.representation)?;
+        let numbers = json!({
+            "n": stored.representation.time.frame_count(), "frames": times.len(), "times": times,
+            "V": sequence.connectivity().vertex_count(), "F": sequence.connectivity().faces().len(),
+            "space": stored.space.name(),
+        });
+        let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
+        let json = json.transpose()?;
+        write(&sequence, &self.out)?;
+        if let Some(json) = json {
+            json.keep()?;
+        }
+        say(&format!("{}: {} frames", self.out.display(), times.len()));
+        Ok(true)
+    }
+
+    fn times(&self, n: usize) -> Result<Vec<f64>, Failure> {
+        if let Some(rate) = self.rate {
+            return Ok(at_rate(n, rate).map_err(|e| format!("--rate: {e}"))?);
+        }
+        if let Some(path) = &self.warp {
+            let rows = pairs(path, "time warps", ["frame", "time"])?;
+            return Ok(warped(&rows, n).map_err(|e| format!("{}: {e}", path.display()))?);
+        }
+        if let Some(given) = &self.times {
+            let times = listed(given)?;
+            check(&times, n).map_err(|e| format!("--times: {e}"))?;
+            return Ok(times);
+        }
+        Ok(evenly(n, self.frames.unwrap_or(n)).map_err(|e| format!("--frames: {e}"))?)
+    }
+}
+
+/// The times themselves, or those of a file.
+fn listed(given: &str) -> Result<Vec<f64>, Failure> {
+    let path = Path::new(given);
+    let times = match numbers(given) {
+        Ok(times) => times,
+        Err(e) if !path.exists() => {
+            return Err(format!(
+                "--times: {e}, and there is no such file; expected numbers separated by commas"
+            )
+            .into());
+        }
+        Err(_) => numbers(&read_text(path, "times")?).map_err(|e| {
+            format!("{given}: {e}; expected numbers separated by commas or line ends")
+        })?,
+    };
+    match times.is_empty() {
+        true => Err("--times: no times; expected at least one".into()),
+        false => Ok(times),
+    }
+}
+
+/// Frames of a representation at these times; `path` is where it came from.
+pub fn frames_at(stored: &Stored, times: &[f64], path: &Path) -> Result<Sequence, Failure> {
+    check_memory(times.len(), stored.representation.dimension())?;
+    let frames = stored.sample(times);
+    let frames = frames.map_err(|e| format!("{}: {e}", path.display()))?;
+    let sequence = Sequence::new(stored.connectivity.clone(), times.len(), frames);
+    Ok(sequence.map_err(|e| format!("{}: sampled, {e}", path.display()))?)
+}
+
+/// An error where that many frames of d numbers do not fit into memory.
+fn check_memory(frames: usize, d: usize) -> Result<(), Failure> {
+    let numbers = frames.checked_mul(d);
+    let fits = numbers.is_some_and(|count| Vec::<f64>::new().try_reserve_exact(count).is_ok());
+    if fits {
+        return Ok(());
+    }
+    let gigabytes = frames as f64 * d as f64 * 8e-9;
+    Err(format!(
+        "{frames} frames of {d} numbers, {gigabytes:.0} GB, do not fit into memory; sample fewer at a time with --times"
+    )
+    .into())
+}
