@@ -15,6 +15,7 @@ use meshseq::signal::fidelity::fit_to_error;
 use meshseq::signal::file::{Stored, load, save};
 use meshseq::signal::fit::{Fit, FitOptions, fit};
 use meshseq::signal::knots::KnotRule;
+use meshseq::signal::layout::Layout;
 use meshseq::signal::pins::Pin;
 
 const THREADS: [&str; 4] = ["1", "2", "3", "7"];
@@ -113,6 +114,7 @@ fn fitted(sequence: &Sequence, k: usize, l: usize, m: usize) -> Fit {
         l,
         m,
         knots: KnotRule::Symmetric,
+        layout: Layout::Ordered { weight: None },
         pins,
     };
     fit(frames, &options).unwrap()
@@ -201,6 +203,7 @@ fn the_library_gives_the_same_bits_in_any_pool() {
                 frames,
                 1e-3 * frames.squared_norm_l2(),
                 KnotRule::Literal,
+                Layout::Ordered { weight: None },
                 &[],
             )
             .unwrap();

@@ -47,8 +47,11 @@ fn signal_verbs() -> Vec<String> {
     let help = meshseq(&["signal", "--help"]);
     let (_, commands) = help.split_once("Commands:\n").unwrap();
     let lines = commands.lines().take_while(|line| !line.is_empty());
-    let names = lines.filter_map(|line| line.split_whitespace().next());
-    let verbs = names.filter(|name| name.chars().all(char::is_lowercase) && *name != "help");
+    // Further lines of a long description are indented deeper.
+    let named = lines.filter_map(|line| line.strip_prefix("  "));
+    let named = named.filter(|line| !line.starts_with(' '));
+    let verbs = named.filter_map(|line| line.split_whitespace().next());
+    let verbs = verbs.filter(|name| *name != "help");
     verbs.map(str::to_owned).collect()
 }
 

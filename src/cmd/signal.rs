@@ -2,6 +2,7 @@
 
 mod design;
 mod edit;
+mod leave_out;
 mod result;
 mod sample;
 mod tables;
@@ -18,7 +19,7 @@ use super::output::{check_place, draft_json, say};
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
-use crate::shape::{SpaceKind, patches_for, prepare};
+use crate::shape::{Space, SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, save};
 use crate::signal::fit::{FitError, FitOptions, fit};
@@ -26,9 +27,11 @@ use crate::signal::in_space::{
     SpaceFit, fit_in_space, fit_in_space_to_rms, fit_in_space_to_rms_refined, refine_in_space,
 };
 use crate::signal::knots::KnotRule;
+use crate::signal::layout::Layout;
 use crate::signal::pins::{Pin, validate_pins};
 use crate::signal::refine::tolerance::fit_to_error_refined;
 use crate::signal::refine::{self, RefineOptions, Refinement};
+use crate::signal::saddles::{Place, places};
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -37,6 +40,9 @@ pub enum Signal {
         after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json"
     )]
     Fit(FitVerb),
+    /// Fit every second frame and predict the others
+    #[command(after_help = leave_out::EXAMPLES)]
+    LeaveOut(leave_out::LeaveOutVerb),
     /// Frames of a representation at any times: other rates, slow and fast motion
     #[command(after_help = sample::EXAMPLES)]
     Sample(sample::SampleVerb),
@@ -56,6 +62,7 @@ impl Signal {
         match self {
             Self::Fit(verb) => verb.run(),
             Self::Sample(verb) => verb.run(),
+            Self::LeaveOut(verb) => verb.run(),
             Self::Edit(verb) => verb.run(),
             Self::Transfer(verb) => verb.run(),
             Self::Design(verb) => verb.run(),
@@ -90,6 +97,10 @@ pub struct FitVerb {
     /// How knots average parameters: symmetric, or literal as printed in the paper's source (Table 1)
     #[arg(long, default_value = "symmetric", value_name = "RULE")]
     knots: String,
+    /// Layout of the pose plane: ordered (by distances between poses mixed with distances along the motion, which needs no pins), ordered:W with
+    /// a weight W from 0 to 1 for the latter, or mds (the paper's, by distances between poses)
+    #[arg(long, default_value_t = Layout::default().to_string(), value_name = "LAYOUT")]
+    layout: String,
     /// CSV of pinned frames: frame (1-based), x, y; with a header line
     #[arg(long, value_name = "FILE")]
     pins: Option<PathBuf>,
@@ -114,6 +125,7 @@ impl FitVerb {
             .parse()
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
         let space: SpaceKind = self.space.parse()?;
+        let layout: Layout = self.layout.parse()?;
         if let Some(out) = &self.out {
             check_representation_place(out)?;
         }
@@ -121,11 +133,7 @@ impl FitVerb {
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
-        if !(self.between >= 0.0 && self.between.is_finite()) {
-            return Err(
-                format!("--between {}: expected a weight of 0 or more", self.between).into(),
-            );
-        }
+        check_between(self.between)?;
         let sequence = self.frames.open(&self.sequence)?;
         let pins = match &self.pins {
             Some(path) => read_pins(path, sequence.frame_count())?,
@@ -134,8 +142,12 @@ impl FitVerb {
         let reference = self.reference(&sequence, space)?;
         let (mesh, frames) = (sequence.connectivity(), sequence.positions());
         let patches = patches_for(space, mesh, &reference, frames)?;
-        let (fitted, refinement) = self.fit(&sequence, space, &reference, &patches, knots, pins)?;
-        let mut numbers = numbers(&sequence, &fitted, space, knots);
+        let prepared = match space {
+            SpaceKind::Vertex => None,
+            _ => Some(prepare(space, mesh.clone(), &reference, &patches)?),
+        };
+        let (fitted, refinement) = self.fit(&sequence, prepared.as_deref(), knots, layout, pins)?;
+        let mut numbers = numbers(&sequence, &fitted, space, knots, layout);
         if let Some(told) = &refinement {
             numbers["refine"] = refine_numbers(told);
         }
@@ -188,10 +200,9 @@ impl FitVerb {
     fn fit(
         &self,
         sequence: &Sequence,
-        space: SpaceKind,
-        reference: &[f64],
-        patches: &[i64],
+        space: Option<&dyn Space>,
         knots: KnotRule,
+        layout: Layout,
         pins: Vec<Pin>,
     ) -> Result<(SpaceFit, Option<Refinement>), Failure> {
         let refine = self.refine.then(|| RefineOptions {
@@ -204,29 +215,30 @@ impl FitVerb {
                 l,
                 m,
                 knots,
+                layout,
                 pins: pins.clone(),
             }),
             _ => None,
         };
         let tolerance = self.tolerance.unwrap_or(f64::NAN);
-        if space == SpaceKind::Vertex {
+        let frames = sequence.positions();
+        let Some(space) = space else {
             let (d, n) = (sequence.dimension(), sequence.frame_count());
-            let frames = MatRef::from_column_major_slice(sequence.positions(), d, n);
+            let frames = MatRef::from_column_major_slice(frames, d, n);
             let most = allowed_error(sequence, tolerance);
             let (fit, told) = match (&constants, &refine) {
                 (Some(options), None) => (fit(frames, options)?, None),
                 (Some(options), Some(how)) => {
                     some(refine::refine(frames, fit(frames, options)?, how)?)
                 }
-                (None, None) => (fit_to_error(frames, most, knots, &pins)?, None),
-                (None, Some(how)) => some(fit_to_error_refined(frames, most, knots, &pins, how)?),
+                (None, None) => (fit_to_error(frames, most, knots, layout, &pins)?, None),
+                (None, Some(how)) => some(fit_to_error_refined(
+                    frames, most, knots, layout, &pins, how,
+                )?),
             };
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
             return Ok((SpaceFit { fit, rms }, told));
-        }
-        let connectivity = sequence.connectivity().clone();
-        let space = &*prepare(space, connectivity, reference, patches)?;
-        let frames = sequence.positions();
+        };
         let size = bounds(sequence.frame(0)).diagonal();
         let rms = (tolerance * size).max(f64::MIN_POSITIVE);
         Ok(match (&constants, &refine) {
@@ -235,11 +247,22 @@ impl FitVerb {
                 let staged = fit_in_space(space, frames, options)?;
                 some(refine_in_space(space, frames, staged, how)?)
             }
-            (None, None) => (fit_in_space_to_rms(space, frames, rms, knots, &pins)?, None),
+            (None, None) => {
+                let fit = fit_in_space_to_rms(space, frames, rms, knots, layout, &pins)?;
+                (fit, None)
+            }
             (None, Some(how)) => some(fit_in_space_to_rms_refined(
-                space, frames, rms, knots, &pins, how,
+                space, frames, rms, knots, layout, &pins, how,
             )?),
         })
+    }
+}
+
+/// An error unless frames between frames can have this weight.
+fn check_between(weight: f64) -> Result<(), Failure> {
+    match weight >= 0.0 && weight.is_finite() {
+        true => Ok(()),
+        false => Err(format!("--between {weight}: expected a weight of 0 or more").into()),
     }
 }
 
@@ -269,6 +292,7 @@ fn numbers(
     found: &SpaceFit,
     space: SpaceKind,
     knots: KnotRule,
+    layout: Layout,
 ) -> serde_json::Value {
     let fit = &found.fit;
     let (k, l, m) = fit.klm();
@@ -279,16 +303,23 @@ fn numbers(
     let distance = found.rms * ((n * vertices) as f64).sqrt();
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
     let t = fit.timings;
+    let astray: Vec<_> = places(fit)
+        .into_iter()
+        .filter(Place::is_astray)
+        .map(|p| json!({"time": p.time, "stray": p.stray, "curvature": p.curvature}))
+        .collect();
     json!({
         "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "V": vertices, "F": sequence.connectivity().faces().len(),
         "space": space.name(), "knots": knots.to_string(),
+        "layout": layout.to_string(), "layout_weight": fit.layout_weight,
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
         "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
+        "astray": astray,
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
         "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
     })
@@ -326,8 +357,9 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         )
     });
     format!(
-        "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots\n\
+        "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
+         {}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
          ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
         v["space"].as_str().unwrap_or(""),
@@ -336,10 +368,13 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         v["l"],
         v["m"],
         v["knots"].as_str().unwrap_or(""),
+        v["layout"].as_str().unwrap_or(""),
+        v["layout_weight"],
         number("error_h"),
         number("error_g"),
         number("error_f"),
         number("error_psi"),
+        astray_line(&v["astray"]),
         100.0 * number("rms_relative"),
         number("kg_percent"),
         v["stored_numbers"],
@@ -352,6 +387,22 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         t("g"),
         t("f"),
     )
+}
+
+/// How many in-betweens go astray, and which the most.
+fn astray_line(places: &serde_json::Value) -> String {
+    let stray = |p: &serde_json::Value| p["stray"].as_f64().unwrap_or(0.0);
+    let places = places.as_array().map_or(&[][..], Vec::as_slice);
+    let farther = |a, b| if stray(b) > stray(a) { b } else { a };
+    match places.iter().reduce(farther) {
+        Some(worst) => format!(
+            "in-betweens astray: {}, the farthest at t = {}, {:.2} steps off",
+            places.len(),
+            worst["time"],
+            stray(worst)
+        ),
+        None => "in-betweens astray: none".into(),
+    }
 }
 
 /// Rows `frame,x,y` below a header line, with frames of 1 to n.

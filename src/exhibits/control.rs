@@ -4,6 +4,7 @@ use super::signals::{curve, line, plane};
 use super::{Exhibit, ExhibitError, Style};
 use crate::sequence::dataset::{DataFolders, open};
 use crate::signal::fit::{FitOptions, fit};
+use crate::signal::layout::Layout;
 use faer::MatRef;
 
 const NAME: &str = "figure-2";
@@ -14,7 +15,10 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let sequence = open(DATASET)?;
     let d = sequence.dimension();
     let z = MatRef::from_column_major_slice(&sequence.positions()[..FRAMES * d], d, FRAMES);
-    let options = FitOptions::new(6, FRAMES, FRAMES - 1);
+    let options = FitOptions {
+        layout: Layout::Mds,
+        ..FitOptions::new(6, FRAMES, FRAMES - 1)
+    };
     let fit = fit(z, &options).map_err(ExhibitError::of(NAME))?;
     let time = &fit.representation.time;
     let points = (1..=FRAMES).map(|i| time.evaluate(i as f64)).collect();

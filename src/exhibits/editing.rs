@@ -8,6 +8,7 @@ use super::{Exhibit, ExhibitError, Style};
 use crate::sequence::dataset::{DataFolders, open};
 use crate::signal::edit::{Edit, edit};
 use crate::signal::fit::{FitOptions, fit};
+use crate::signal::layout::Layout;
 use crate::signal::psi::Representation;
 
 const NAME: &str = "figure-5";
@@ -25,7 +26,11 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let n = sequence.frame_count();
     let z = MatRef::from_column_major_slice(sequence.positions(), sequence.dimension(), n);
     let [k, l, m] = CONSTANTS;
-    let found = fit(z, &FitOptions::new(k, l, m)).map_err(ExhibitError::of(NAME))?;
+    let options = FitOptions {
+        layout: Layout::Mds,
+        ..FitOptions::new(k, l, m)
+    };
+    let found = fit(z, &options).map_err(ExhibitError::of(NAME))?;
     let time = &found.representation.time;
     let added = Edit::Loop {
         after: AFTER,

@@ -7,6 +7,7 @@ use crate::sequence::dataset::{DataFolders, open};
 use crate::shape::{SpaceKind, prepare_for};
 use crate::signal::fit::FitOptions;
 use crate::signal::in_space::{fit_in_space, sample_in_space};
+use crate::signal::layout::Layout;
 
 const NAME: &str = "figure-4";
 const DATASET: &str = "@flag";
@@ -17,7 +18,10 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let (mesh, positions) = (sequence.connectivity(), sequence.positions());
     let space = prepare_for(SpaceKind::Gradient, mesh, positions);
     let space = space.map_err(ExhibitError::of(NAME))?;
-    let options = FitOptions::new(98, 100, 79);
+    let options = FitOptions {
+        layout: Layout::Mds,
+        ..FitOptions::new(98, 100, 79)
+    };
     let found = fit_in_space(&*space, sequence.positions(), &options);
     let fit = found.map_err(ExhibitError::of(NAME))?.fit;
     let made = sample_in_space(&*space, &fit.representation, &SHOWN);

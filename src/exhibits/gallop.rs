@@ -6,6 +6,7 @@ use super::{Exhibit, ExhibitError, Panel};
 use crate::sequence::dataset::DataFolders;
 use crate::signal::fit::{FitOptions, fit};
 use crate::signal::knots::KnotRule;
+use crate::signal::layout::Layout;
 use faer::MatRef;
 
 const NAME: &str = "figure-1";
@@ -19,6 +20,7 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let frames = &sequence.positions()[..n * sequence.dimension()];
     let options = FitOptions {
         knots: KnotRule::Literal,
+        layout: Layout::Mds,
         ..FitOptions::new(16, 12, 7)
     };
     let z = MatRef::from_column_major_slice(frames, sequence.dimension(), n);

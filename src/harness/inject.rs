@@ -141,6 +141,14 @@ faults! {
         Outputs(|_, out| numbers(out, "P", stretch));
     "pins-unfinished" in "signal.mds_fixed": "the start returned as it is",
         Outputs(|inputs, out| copy(inputs, "start", out, "P"));
+    "layout-order-forgotten" in "signal.layout": "distances along the motion left out",
+        Inputs(|inputs| numbers(inputs, "weight", |w| w[0] = 0.0));
+    "layout-swapped" in "signal.layout": "two frames swapped",
+        Outputs(|_, out| numbers(out, "P", |p| swap_rows(p, 2, 1, 2)));
+    "layout-relative" in "signal.layout": "the layout a millionth too large",
+        Outputs(|_, out| numbers(out, "P", stretch));
+    "layout-step" in "signal.layout": "dissimilarities a millionth too large",
+        Outputs(|_, out| numbers(out, "delta", stretch));
     "rbf-side-condition-dropped" in "signal.rbf": "one coefficient a millionth too large",
         Outputs(|_, out| { let m = row_length(out, "g"); numbers(out, "g", |g| stretch(&mut g[m..2 * m])) });
     "rbf-swapped" in "signal.rbf": "coefficients of the first two sites swapped",

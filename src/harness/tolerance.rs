@@ -109,6 +109,13 @@ tolerances! {
         "stress_difference" <= 1e-9, "both end with a second-order method";
         "position_difference" <= 1e-8, "where both gradients vanish; pins leave no motion";
     }
+    "signal.layout" {
+        "delta" <= 1e-12, "sums of at most n steps, over the greatest dissimilarity";
+        "above_point" <= 0.0, "a layout is better than none";
+        "delta_difference" <= 1e-12, "sums of at most n steps, over the greatest dissimilarity";
+        "stress_difference" <= 1e-6, "as signal.mds: majorisation alone stops before the minimum";
+        "position_difference" <= 1e-8, "after the best rigid motion, where both gradients vanish";
+    }
     "signal.rbf" {
         "side_conditions" <= 1e-10, "coefficients come from a null space";
         "formula" <= 1e-9, "values are those of the coefficients";

@@ -7,6 +7,7 @@ use faer::MatRef;
 use super::fit::{Attempt, Base, FEWEST_FRAMES, Fit, FitError, error_h};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::KnotRule;
+use super::layout::Layout;
 use super::pins::{Pin, validate_pins};
 
 /// Shares of the allowed error (2) that the shape signal may take, and of what then remains the pose signal; all pairs are tried.
@@ -15,20 +16,27 @@ const SHARES: [f64; 5] = [0.15, 0.3, 0.45, 0.6, 0.75];
 /// The representation with the fewest stored numbers, of those tried, whose error (2) is at most `most`, in squared units of the frames.
 ///
 /// For each share of the error given to h the least m is taken, for each share given to g the least l of the greedy order, and the least k by
-/// bisection. One singular value decomposition serves every m. The interpolating representation, whose error is rounding, is the last resort.
+/// bisection. Of a layout's weights the one whose interpolating signals have the best in-betweens is taken, for each m. One singular value
+/// decomposition serves every m. The interpolating representation, whose error is rounding, is the last resort.
 pub fn fit_to_error(
     frames: MatRef<'_, f64>,
     most: f64,
     rule: KnotRule,
+    layout: Layout,
     pins: &[Pin],
 ) -> Result<Fit, FitError> {
-    check(frames, most, pins)?;
+    check(frames, most, layout, pins)?;
     let start = Instant::now();
     let whole = shape_signal(frames, frames.ncols() - 1)?;
-    choose(frames, &whole, start.elapsed(), most, rule, pins)
+    choose(frames, &whole, start.elapsed(), most, rule, layout, pins)
 }
 
-pub(super) fn check(frames: MatRef<'_, f64>, most: f64, pins: &[Pin]) -> Result<(), FitError> {
+pub(super) fn check(
+    frames: MatRef<'_, f64>,
+    most: f64,
+    layout: Layout,
+    pins: &[Pin],
+) -> Result<(), FitError> {
     let n = frames.ncols();
     if n < FEWEST_FRAMES {
         return Err(FitError::TooFewFrames { found: n });
@@ -36,6 +44,7 @@ pub(super) fn check(frames: MatRef<'_, f64>, most: f64, pins: &[Pin]) -> Result<
     if most.is_nan() || most <= 0.0 {
         return Err(FitError::BadTolerance { value: most });
     }
+    layout.check()?;
     Ok(validate_pins(pins, n)?)
 }
 
@@ -46,6 +55,7 @@ pub(super) fn choose(
     h_time: Duration,
     most: f64,
     rule: KnotRule,
+    layout: Layout,
     pins: &[Pin],
 ) -> Result<Fit, FitError> {
     let mut dimensions: Vec<usize> = SHARES
@@ -57,7 +67,8 @@ pub(super) fn choose(
     for m in dimensions.into_iter().rev() {
         let shape = leading(whole, m);
         let error = error_h(frames, &shape);
-        let base = Base::from_shape(shape, error, h_time, pins);
+        let mut base = Base::from_shape(shape, error, h_time, layout, pins)?;
+        base.settle(rule)?;
         if let Some(attempt) = least_l_and_k(&base, error, most, rule)? {
             let fit = base.finish(attempt);
             let numbers = fit.representation.stored_numbers();
@@ -71,7 +82,7 @@ pub(super) fn choose(
         None => {
             let n = frames.ncols();
             let error = error_h(frames, whole);
-            Base::from_shape(whole.clone(), error, h_time, pins).fit(n + 2, n, rule)
+            Base::from_shape(whole.clone(), error, h_time, layout, pins)?.fit(n + 2, n, rule)
         }
     }
 }
@@ -167,12 +178,13 @@ mod tests {
         let mut last = usize::MAX;
         for share in [1e-12, 1e-4, 1e-2, 0.3] {
             let most = share * z.squared_norm_l2();
-            let fit = fit_to_error(z.as_ref(), most, KnotRule::Symmetric, &[]).unwrap();
+            let fit =
+                fit_to_error(z.as_ref(), most, KnotRule::Symmetric, Layout::Mds, &[]).unwrap();
             assert!(fit.errors.psi <= most, "{share}: {:?}", fit.errors);
             let numbers = fit.representation.stored_numbers();
             assert!(numbers <= last);
             last = numbers;
         }
-        assert!(fit_to_error(z.as_ref(), f64::NAN, KnotRule::Literal, &[]).is_err());
+        assert!(fit_to_error(z.as_ref(), f64::NAN, KnotRule::Literal, Layout::Mds, &[]).is_err());
     }
 }

@@ -7,13 +7,15 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::Point;
+use super::cubic::{CubicSpline, Ends};
 use super::f::{Spline, SplineError};
 use super::g::{PoseError, PoseSignal};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
-use super::mds::{Dissimilarities, Steps, scale_counting};
+use super::layout::{Distances, Layout, LayoutError};
+use super::mds::Steps;
 use super::parameters::{Grid, centripetal, distinct};
-use super::pins::{Pin, PinError, principal_start, validate_pins};
+use super::pins::{Pin, PinError, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
 use super::sites::{SiteOrder, site_order};
@@ -41,18 +43,21 @@ pub struct FitOptions {
     pub m: usize,
     /// Knot rule of the time signal.
     pub knots: KnotRule,
+    /// Which dissimilarities the pose-space positions come from.
+    pub layout: Layout,
     /// Pose-space positions that the user fixes.
     pub pins: Vec<Pin>,
 }
 
 impl FitOptions {
-    /// These constants, the default knot rule, no pins.
+    /// These constants, the default knot rule and layout, no pins.
     pub fn new(k: usize, l: usize, m: usize) -> Self {
         Self {
             k,
             l,
             m,
             knots: KnotRule::default(),
+            layout: Layout::default(),
             pins: Vec::new(),
         }
     }
@@ -75,6 +80,9 @@ pub enum FitError {
         high: usize,
         frames: usize,
     },
+    /// See [`LayoutError`].
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// See [`PinError`].
     #[error(transparent)]
     Pins(#[from] PinError),
@@ -140,6 +148,8 @@ pub struct Fit {
     pub sites: SiteOrder,
     /// Frames within this distance in pose space count as one pose; see [`fit`].
     pub same_pose: f64,
+    /// Weight of distances along the motion in the layout; 0 is the paper's.
+    pub layout_weight: f64,
     pub errors: Errors,
     pub timings: Timings,
 }
@@ -168,6 +178,10 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 /// Repeated and nearly repeated poses (reading 10). Frames within 1e-4 of the layout's diameter are one pose; the first frame of each pose is a
 /// candidate site, and the others come after all candidates, so that l = n still interpolates. Where (2) then still exceeds 8 times (3) + (4), the
 /// mark of sites so close that g swings between them, wider poses are tried, with one site each, on a fixed ladder, and the least (2) is kept.
+///
+/// A layout of several weights is fitted with each, and the fit is kept with the least sum of (2) and of the squared distances of the in-betweens
+/// g(f(i + 1/2)) from the natural cubic spline through the x_i: frames alone do not tell what lies between them, and of smooth curves that one
+/// bends least. Costs as many fits as there are weights, with one h.
 pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitError> {
     let n = frames.ncols();
     let most_m = n.saturating_sub(1);
@@ -180,7 +194,8 @@ pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitErro
         ],
     )?;
     validate_pins(&options.pins, n)?;
-    let base = Base::new(frames, options.m, &options.pins)?;
+    options.layout.check()?;
+    let base = Base::new(frames, options.m, options.layout, &options.pins)?;
     base.fit(options.k, options.l, options.knots)
 }
 
@@ -205,13 +220,34 @@ pub(super) fn check_ranges(
     }
 }
 
-/// What k and l do not change: the shape signal and the pose-space positions.
-pub(super) struct Base {
-    shape: ShapeSignal,
+/// Positions of one weight of the layout, and what follows from them alone.
+struct Plane {
+    weight: f64,
     positions: Vec<Point>,
     steps: Steps,
     diameter: f64,
     parameters: Vec<f64>,
+}
+
+impl Plane {
+    fn new(weight: f64, positions: Vec<Point>, steps: Steps) -> Self {
+        let diameter = diameter(&positions);
+        Self {
+            parameters: frame_parameters(&positions, diameter),
+            weight,
+            positions,
+            steps,
+            diameter,
+        }
+    }
+}
+
+/// What k and l do not change: the shape signal and the pose-space positions, of every weight that the layout may have.
+pub(super) struct Base {
+    shape: ShapeSignal,
+    planes: Vec<Plane>,
+    /// Which plane is fitted to.
+    at: usize,
     error_h: f64,
     /// An error (2) that is rounding.
     negligible: f64,
@@ -219,40 +255,106 @@ pub(super) struct Base {
 }
 
 impl Base {
-    pub(super) fn new(frames: MatRef<'_, f64>, m: usize, pins: &[Pin]) -> Result<Self, FitError> {
+    pub(super) fn new(
+        frames: MatRef<'_, f64>,
+        m: usize,
+        layout: Layout,
+        pins: &[Pin],
+    ) -> Result<Self, FitError> {
         let (shape, h) = timed(|| shape_signal(frames, m));
         let shape = shape?;
         let error_h = error_h(frames, &shape);
-        Ok(Self::from_shape(shape, error_h, h, pins))
+        Ok(Self::from_shape(shape, error_h, h, layout, pins)?)
     }
 
     /// From a shape signal already found, with its error (3).
-    pub(super) fn from_shape(shape: ShapeSignal, error_h: f64, h: Duration, pins: &[Pin]) -> Self {
+    pub(super) fn from_shape(
+        shape: ShapeSignal,
+        error_h: f64,
+        h: Duration,
+        layout: Layout,
+        pins: &[Pin],
+    ) -> Result<Self, FactorError> {
         let x = shape.coordinates.as_ref();
-        let ((positions, steps), mds) = timed(|| {
-            let delta = Dissimilarities::new(x);
-            scale_counting(&delta, &principal_start(x, pins), pins)
+        let (planes, mds) = timed(|| {
+            let distances = Distances::new(x);
+            let plane = |weight| -> Result<Plane, FactorError> {
+                let (positions, steps) = distances.positions(x, weight, pins)?;
+                Ok(Plane::new(weight, positions, steps))
+            };
+            let weights = layout.weights().into_par_iter();
+            weights.map(plane).collect::<Result<Vec<_>, _>>()
         });
-        let diameter = diameter(&positions);
-        Self {
-            parameters: frame_parameters(&positions, diameter),
-            diameter,
+        Ok(Self {
+            planes: planes?,
+            at: 0,
             negligible: 1e-12 * shape.coordinates.squared_norm_l2(),
             shape,
-            positions,
-            steps,
             error_h,
             timings: Timings {
                 h,
                 mds,
                 ..Timings::default()
             },
+        })
+    }
+
+    fn plane(&self) -> &Plane {
+        &self.planes[self.at]
+    }
+
+    /// Makes an attempt in every plane and stays in the one whose attempt has the least sum of (2) and of what its in-betweens stray; see [`fit`].
+    fn choose(
+        &mut self,
+        attempt: impl Fn(&Self) -> Result<Attempt, FitError>,
+    ) -> Result<Attempt, FitError> {
+        let mut best = attempt(self)?;
+        if self.planes.len() == 1 {
+            return Ok(best);
         }
+        let witness = CubicSpline::new(self.shape.coordinates.as_ref(), Ends::Natural).midpoints();
+        let score = |base: &Self, attempt: &Attempt| {
+            let between = base.between(attempt) - &witness;
+            attempt.errors.psi + between.squared_norm_l2()
+        };
+        let (mut least, mut chosen) = (score(self, &best), self.at);
+        for at in 1..self.planes.len() {
+            self.at = at;
+            let next = attempt(self)?;
+            let found = score(self, &next);
+            if found < least {
+                (least, chosen, best) = (found, at, next);
+            }
+        }
+        self.at = chosen;
+        Ok(best)
+    }
+
+    /// Chooses the plane by interpolating signals, for searches over k and l.
+    pub(super) fn settle(&mut self, rule: KnotRule) -> Result<(), FitError> {
+        if self.planes.len() > 1 {
+            let interpolate = |base: &Self| {
+                let k = base.most_control_points();
+                base.attempt(k, rule, SAME_POSE * base.plane().diameter, || {
+                    base.order(usize::MAX)
+                })
+            };
+            self.choose(interpolate)?;
+        }
+        Ok(())
+    }
+
+    /// g(f(i + 1/2)), m x (n - 1).
+    fn between(&self, attempt: &Attempt) -> Mat<f64> {
+        let parameters = &self.plane().parameters;
+        let time = TimeSignal::new(attempt.spline.clone(), parameters.clone());
+        let times: Vec<f64> = (1..parameters.len()).map(|i| i as f64 + 0.5).collect();
+        attempt.pose.evaluate(&time.evaluate_all(&times))
     }
 
     /// t_1 .. t_n.
     pub(super) fn parameters(&self) -> &[f64] {
-        &self.parameters
+        &self.plane().parameters
     }
 
     /// m.
@@ -262,34 +364,42 @@ impl Base {
 
     /// The greatest k that the distinct parameters allow.
     pub(super) fn most_control_points(&self) -> usize {
-        distinct(&self.parameters).len() + 2
+        distinct(&self.plane().parameters).len() + 2
     }
 
     /// At most `count` sites, the first frames of poses before the others.
     pub(super) fn order(&self, count: usize) -> Result<SiteOrder, FactorError> {
-        let candidates = first_of_each(&self.positions, SAME_POSE * self.diameter);
+        let plane = self.plane();
+        let candidates = first_of_each(&plane.positions, SAME_POSE * plane.diameter);
         self.order_among(count, &candidates)
     }
 
     /// At most `count` sites, one a pose.
     fn order_of_poses(&self, count: usize, same_pose: f64) -> Result<SiteOrder, FactorError> {
-        let candidates = first_of_each(&self.positions, same_pose);
+        let candidates = first_of_each(&self.plane().positions, same_pose);
         let poses = candidates.iter().filter(|&&first| first).count();
         self.order_among(count.min(poses), &candidates)
     }
 
     fn order_among(&self, count: usize, candidates: &[bool]) -> Result<SiteOrder, FactorError> {
         let x = self.shape.coordinates.as_ref();
-        site_order(&self.positions, x, count, candidates)
+        site_order(&self.plane().positions, x, count, candidates)
     }
 
-    pub(super) fn fit(self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {
-        let mut best = self.attempt(k, rule, SAME_POSE * self.diameter, || self.order(l))?;
+    pub(super) fn fit(mut self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {
+        let best = self.choose(|base| base.best_attempt(k, l, rule))?;
+        Ok(self.finish(best))
+    }
+
+    /// The attempt with the least (2) on the ladder of poses; see [`fit`].
+    fn best_attempt(&self, k: usize, l: usize, rule: KnotRule) -> Result<Attempt, FitError> {
+        let diameter = self.plane().diameter;
+        let mut best = self.attempt(k, rule, SAME_POSE * diameter, || self.order(l))?;
         if best.errors.psi > UNSTABLE * (best.errors.h + best.errors.g)
             && best.errors.psi > self.negligible
         {
             for share in WIDER_POSES {
-                let same_pose = share * self.diameter;
+                let same_pose = share * diameter;
                 let next =
                     self.attempt(k, rule, same_pose, || self.order_of_poses(l, same_pose))?;
                 if next.errors.psi < best.errors.psi {
@@ -297,7 +407,7 @@ impl Base {
                 }
             }
         }
-        Ok(self.finish(best))
+        Ok(best)
     }
 
     fn attempt(
@@ -324,15 +434,16 @@ impl Base {
         rule: KnotRule,
     ) -> Result<Attempt, FitError> {
         let x = self.shape.coordinates.as_ref();
-        let (pose, rbf) = timed(|| PoseSignal::fit(&self.positions, x, sites));
+        let positions = &self.plane().positions;
+        let (pose, rbf) = timed(|| PoseSignal::fit(positions, x, sites));
         let pose = pose?;
         let (fitted, f) = timed(|| self.spline(k, rule));
         let (spline, curve) = fitted?;
         let gap = |(a, b): (&Point, &Point)| super::distance(*a, *b).powi(2);
         let errors = Errors {
             h: self.error_h,
-            g: (pose.evaluate(&self.positions) - x).squared_norm_l2(),
-            f: self.positions.iter().zip(&curve).map(gap).sum(),
+            g: (pose.evaluate(positions) - x).squared_norm_l2(),
+            f: positions.iter().zip(&curve).map(gap).sum(),
             // H is orthonormal and (3) the least, so what h leaves is orthogonal to what g and f leave.
             psi: self.error_h + (pose.evaluate(&curve) - x).squared_norm_l2(),
         };
@@ -344,7 +455,7 @@ impl Base {
                 order: Vec::new(),
                 errors: Vec::new(),
             },
-            same_pose: SAME_POSE * self.diameter,
+            same_pose: SAME_POSE * self.plane().diameter,
             timings: Timings {
                 rbf,
                 f,
@@ -354,27 +465,27 @@ impl Base {
     }
 
     fn spline(&self, k: usize, rule: KnotRule) -> Result<(Spline, Vec<Point>), FitError> {
-        let t = distinct(&self.parameters);
+        let plane = self.plane();
+        let t = distinct(&plane.parameters);
         let mut u = knots(&t, k.min(t.len() + 2), rule)?;
         let grid = Grid::new(t[t.len() - 1]);
         u.iter_mut().for_each(|u| *u = grid.round(*u));
-        Ok(Spline::fit_with_values(
-            &self.parameters,
-            &self.positions,
-            &u,
-        )?)
+        let fitted = Spline::fit_with_values(&plane.parameters, &plane.positions, &u)?;
+        Ok(fitted)
     }
 
-    pub(super) fn finish(self, attempt: Attempt) -> Fit {
+    pub(super) fn finish(mut self, attempt: Attempt) -> Fit {
+        let plane = self.planes.swap_remove(self.at);
         Fit {
             representation: Representation {
-                time: TimeSignal::new(attempt.spline, self.parameters),
+                time: TimeSignal::new(attempt.spline, plane.parameters),
                 pose: attempt.pose,
                 offset: self.shape.offset,
                 basis: self.shape.basis,
             },
-            positions: self.positions,
-            steps: self.steps,
+            positions: plane.positions,
+            steps: plane.steps,
+            layout_weight: plane.weight,
             coordinates: self.shape.coordinates,
             singular_values: self.shape.singular_values,
             sites: attempt.sites,
@@ -446,6 +557,7 @@ mod tests {
     fn options(k: usize, l: usize, m: usize) -> FitOptions {
         FitOptions {
             knots: KnotRule::Literal,
+            layout: Layout::Mds,
             ..FitOptions::new(k, l, m)
         }
     }

@@ -7,6 +7,7 @@ use thiserror::Error;
 use super::fidelity::fit_to_error;
 use super::fit::{Fit, FitError, FitOptions, fit};
 use super::knots::KnotRule;
+use super::layout::Layout;
 use super::pins::Pin;
 use super::psi::Representation;
 use super::refine::tolerance::fit_to_error_refined;
@@ -71,10 +72,11 @@ pub fn fit_in_space_to_rms(
     frames: &[f64],
     rms: f64,
     knots: KnotRule,
+    layout: Layout,
     pins: &[Pin],
 ) -> Result<SpaceFit, SpaceFitError> {
-    let staged = |z: MatRef<'_, f64>, most| Ok((fit_to_error(z, most, knots, pins)?, ()));
-    let interpolating = |z: MatRef<'_, f64>| Ok((interpolate(z, knots, pins)?, ()));
+    let staged = |z: MatRef<'_, f64>, most| Ok((fit_to_error(z, most, knots, layout, pins)?, ()));
+    let interpolating = |z: MatRef<'_, f64>| Ok((interpolate(z, knots, layout, pins)?, ()));
     Ok(to_rms(space, frames, rms, staged, interpolating)?.0)
 }
 
@@ -84,22 +86,30 @@ pub fn fit_in_space_to_rms_refined(
     frames: &[f64],
     rms: f64,
     knots: KnotRule,
+    layout: Layout,
     pins: &[Pin],
     options: &RefineOptions,
 ) -> Result<(SpaceFit, Refinement), SpaceFitError> {
-    let refined = |z: MatRef<'_, f64>, most| fit_to_error_refined(z, most, knots, pins, options);
+    let refined =
+        |z: MatRef<'_, f64>, most| fit_to_error_refined(z, most, knots, layout, pins, options);
     let interpolating = |z: MatRef<'_, f64>| {
-        let fit = interpolate(z, knots, pins)?;
+        let fit = interpolate(z, knots, layout, pins)?;
         let untouched = Refinement::none(&fit, options);
         Ok((fit, untouched))
     };
     to_rms(space, frames, rms, refined, interpolating)
 }
 
-fn interpolate(z: MatRef<'_, f64>, knots: KnotRule, pins: &[Pin]) -> Result<Fit, FitError> {
+fn interpolate(
+    z: MatRef<'_, f64>,
+    knots: KnotRule,
+    layout: Layout,
+    pins: &[Pin],
+) -> Result<Fit, FitError> {
     let n = z.ncols();
     let options = FitOptions {
         knots,
+        layout,
         pins: pins.to_vec(),
         ..FitOptions::new(n + 2, n, n - 1)
     };
@@ -217,7 +227,16 @@ mod tests {
         )
         .unwrap();
         let symmetric = KnotRule::Symmetric;
-        let fit = |rms| fit_in_space_to_rms(&*space, sequence.positions(), rms, symmetric, &[]);
+        let fit = |rms| {
+            fit_in_space_to_rms(
+                &*space,
+                sequence.positions(),
+                rms,
+                symmetric,
+                Layout::Mds,
+                &[],
+            )
+        };
         let (fine, coarse) = (fit(0.005).unwrap(), fit(0.05).unwrap());
         assert!(fine.rms <= 0.005 && coarse.rms <= 0.05);
         assert!(

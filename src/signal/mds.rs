@@ -54,10 +54,35 @@ impl Dissimilarities {
         Self { n, values }
     }
 
+    /// delta_ij of every pair, which must be symmetric and 0 on the diagonal.
+    pub(super) fn from_fn(n: usize, mut delta: impl FnMut(usize, usize) -> f64) -> Self {
+        let mut values = Vec::with_capacity(n * n);
+        for i in 0..n {
+            values.extend((0..n).map(|j| delta(i, j)));
+        }
+        Self { n, values }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.n
     }
 
+    /// The greatest of them.
+    pub(super) fn greatest(&self) -> f64 {
+        self.values.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The sum of squares over all ordered pairs.
+    pub(super) fn sum_of_squares(&self) -> f64 {
+        norm_squared(&self.values)
+    }
+
+    /// delta, n x n.
+    pub fn matrix(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.values, self.n, self.n)
+    }
+
+    /// delta_i1 .. delta_in.
     pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.n..(i + 1) * self.n]
     }

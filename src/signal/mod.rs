@@ -17,12 +17,15 @@
 //! | 4.2 times for other rates, slow and fast motion | [`resample`] |
 //! | 4.3 transfer by examples | [`transfer`] |
 //! | 4.4 poses placed by hand, a sketched curve | [`design`], [`sketch`] |
+//! | 6 a layout that needs no pins | [`layout`] |
+//! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`cubic`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
 //! text is off, `docs/READINGS.md` says how it is read; "reading r" below is its number r.
 
 mod basis;
+pub mod cubic;
 pub mod design;
 pub mod edit;
 pub mod edits_toml;
@@ -35,6 +38,8 @@ pub mod h;
 pub mod in_space;
 pub mod insert;
 pub mod knots;
+pub mod layout;
+pub mod leave_out;
 pub mod mds;
 pub mod parameters;
 pub mod pins;
@@ -44,6 +49,7 @@ pub mod refine;
 pub mod repin;
 pub mod resample;
 pub mod rho;
+pub mod saddles;
 pub mod sites;
 pub mod sketch;
 mod strand;

@@ -70,7 +70,11 @@ pub fn principal_start(coordinates: MatRef<'_, f64>, pins: &[Pin]) -> Vec<Point>
             }
         })
     };
-    let mut start: Vec<Point> = (0..coordinates.ncols()).map(principal).collect();
+    moved_onto((0..coordinates.ncols()).map(principal).collect(), pins)
+}
+
+/// Points moved by the best rigid motion, reflections allowed, onto the pins, which then sit exactly where they are asked to.
+pub(super) fn moved_onto(mut start: Vec<Point>, pins: &[Pin]) -> Vec<Point> {
     let Some((turn, from, to)) = rigid_motion(&start, pins) else {
         return start;
     };

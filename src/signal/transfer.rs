@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::fit::{Base, Fit, FitError, check_ranges};
 use super::h::ShapeSignal;
 use super::knots::KnotRule;
+use super::layout::Layout;
 use super::pins::{Pin, validate_pins};
 use super::psi::Representation;
 use crate::linalg::dense::{FactorError, ThinSvd, thin_svd};
@@ -171,7 +172,7 @@ impl ExampleBasis {
         })
     }
 
-    /// Signals found from frames Z (d x n) "in the usual way" from their coordinates in this basis: scaling, g with l sites, f with k control points. Errors
+    /// Signals found from frames Z (d x n) "in the usual way" from their coordinates in this basis: the paper's scaling, g with l sites, f with k control points. Errors
     /// (4) and (7) are those of coordinates and poses; (2) is that of coordinates too, and (3) is 0, for the basis is not orthonormal.
     pub fn fit(
         &self,
@@ -190,7 +191,8 @@ impl ExampleBasis {
             coordinates: self.coordinates(frames)?,
             singular_values: self.factors.s.clone(),
         };
-        let base = Base::from_shape(shape, 0.0, Default::default(), pins);
+        let base = Base::from_shape(shape, 0.0, Default::default(), Layout::Mds, pins)
+            .map_err(FitError::from)?;
         Ok(base.fit(k, l, knots)?)
     }
 }

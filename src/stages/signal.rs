@@ -12,6 +12,7 @@ use crate::signal::g::PoseSignal;
 use crate::signal::h::shape_signal;
 use crate::signal::insert::insert_knots;
 use crate::signal::knots::{KnotRule, knots};
+use crate::signal::layout::{Distances, Layout};
 use crate::signal::mds::{Dissimilarities, scale};
 use crate::signal::parameters::{centripetal, distinct};
 use crate::signal::pins::{Pin, principal_start, validate_pins};
@@ -36,6 +37,11 @@ pub static STAGES: &[Stage] = &[
         name: "signal.mds_fixed",
         about: "pose-space positions with some of them fixed (section 3.2.1)",
         prepare: mds_fixed,
+    },
+    Stage {
+        name: "signal.layout",
+        about: "pose-space positions by scaling distances mixed with those along the motion (section 6: free of pins)",
+        prepare: layout,
     },
     Stage {
         name: "signal.rbf",
@@ -129,6 +135,38 @@ fn scaling(inputs: &Bundle, pins: Vec<Pin>) -> Result<Box<dyn Call>, StageError>
     call(
         move || Ok(scale(&Dissimilarities::new(x.as_ref()), &start, &pins)),
         |positions| Bundle::from([("P", Array::points(positions))]),
+    )
+}
+
+/// Forming the dissimilarities is part of the work.
+fn layout(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let x = inputs.matrix("X")?;
+    let weight = match inputs.vector("weight")? {
+        [weight] => *weight,
+        other => {
+            return Err(StageError::Failed(format!(
+                "`weight` has {} numbers, expected 1",
+                other.len()
+            )));
+        }
+    };
+    let ordered = Layout::Ordered {
+        weight: Some(weight),
+    };
+    ordered.check().map_err(StageError::from_error)?;
+    call(
+        move || {
+            let distances = Distances::new(x.as_ref());
+            let positions = distances.positions(x.as_ref(), weight, &[]);
+            let (positions, _) = positions.map_err(StageError::from_error)?;
+            Ok((distances.mixed(weight), positions))
+        },
+        |(delta, positions)| {
+            Bundle::from([
+                ("delta", Array::columns(delta.matrix())),
+                ("P", Array::points(positions)),
+            ])
+        },
     )
 }
 
@@ -365,6 +403,7 @@ fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let [k, l, m] = ["k", "l", "m"].map(|name| inputs.integer(name));
     let options = FitOptions {
         knots: rule(inputs)?,
+        layout: Layout::Mds,
         ..FitOptions::new(k?, l?, m?)
     };
     let n = frames.ncols();
@@ -437,6 +476,7 @@ impl Choice {
     pub fn fit(&self, frames: MatRef<'_, f64>) -> Result<Fit, StageError> {
         let options = FitOptions {
             knots: self.knots,
+            layout: Layout::Mds,
             ..FitOptions::new(self.k, self.l, self.m)
         };
         fit(frames, &options).map_err(StageError::from_error)
@@ -462,6 +502,7 @@ impl<'a> Chain<'a> {
         Ok(match stage {
             "signal.mds" => Bundle::from([x(), ("start", Array::points(&self.start))]),
             "signal.mds_fixed" => self.pinned(),
+            "signal.layout" => Bundle::from([x(), ("weight", Array::vector(&[LAYOUT_WEIGHT]))]),
             "signal.rbf" => Bundle::from([
                 x(),
                 p(),
@@ -554,6 +595,9 @@ impl<'a> Chain<'a> {
         self.times.iter().map(|&t| time.evaluate(t)).collect()
     }
 }
+
+/// A weight at which both kinds of distances matter.
+const LAYOUT_WEIGHT: f64 = 0.5;
 
 /// Frame times and times between them: 1, 1.3, 2, 2.3, ...; at most 64 pairs, spread evenly.
 fn between_frames(n: usize) -> Vec<f64> {

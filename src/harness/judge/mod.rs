@@ -47,6 +47,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.h" => (shape::own, shape::against),
         "signal.mds" => (scaling::own, scaling::against),
         "signal.mds_fixed" => (scaling::fixed_own, scaling::fixed_against),
+        "signal.layout" => (scaling::layout_own, scaling::layout_against),
         "signal.rbf" => (pose::rbf_own, pose::rbf_against),
         "signal.sites" => (pose::sites_own, pose::sites_against),
         "signal.parameters" => (time::parameters_own, time::parameters_against),

@@ -10,6 +10,7 @@ use crate::signal::fidelity::{check, choose, leading, least_m};
 use crate::signal::fit::{Attempt, Base, Fit, FitError, error_h};
 use crate::signal::h::{ShapeSignal, shape_signal};
 use crate::signal::knots::KnotRule;
+use crate::signal::layout::Layout;
 use crate::signal::pins::Pin;
 
 /// The share of the allowed error (2) that h alone may leave.
@@ -29,22 +30,25 @@ pub fn fit_to_error_refined(
     frames: MatRef<'_, f64>,
     most: f64,
     rule: KnotRule,
+    layout: Layout,
     pins: &[Pin],
     options: &RefineOptions,
 ) -> Result<(Fit, Refinement), FitError> {
-    check(frames, most, pins)?;
+    check(frames, most, layout, pins)?;
     let start = Instant::now();
     let whole = shape_signal(frames, frames.ncols() - 1)?;
     let h_time = start.elapsed();
-    let staged = choose(frames, &whole, h_time, most, rule, pins)?;
+    let staged = choose(frames, &whole, h_time, most, rule, layout, pins)?;
     let least = least_m(&whole, SHARE * most);
     let mut best = (staged.representation.stored_numbers(), staged);
     let mut found = None;
     for m in least..(least + DIMENSIONS).min(whole.basis.ncols() + 1) {
         let shape = leading(&whole, m);
         let error = error_h(frames, &shape);
+        let mut base = Base::from_shape(shape, error, h_time, layout, pins)?;
+        base.settle(rule)?;
         let search = Search {
-            base: Base::from_shape(shape, error, h_time, pins),
+            base,
             whole: &whole,
             most,
             rule,
@@ -155,8 +159,9 @@ mod tests {
         for share in [1e-3, 1e-2, 0.1] {
             let most = share * z.squared_norm_l2();
             let rule = KnotRule::Symmetric;
-            let staged = fit_to_error(z.as_ref(), most, rule, &[]).unwrap();
-            let (fit, told) = fit_to_error_refined(z.as_ref(), most, rule, &[], &options).unwrap();
+            let staged = fit_to_error(z.as_ref(), most, rule, Layout::Mds, &[]).unwrap();
+            let (fit, told) =
+                fit_to_error_refined(z.as_ref(), most, rule, Layout::Mds, &[], &options).unwrap();
             assert!(fit.errors.psi <= most && told.after <= most, "{share}");
             let numbers = |fit: &Fit| fit.representation.stored_numbers();
             assert!(
@@ -166,6 +171,16 @@ mod tests {
                 staged.klm()
             );
         }
-        assert!(fit_to_error_refined(z.as_ref(), -1.0, KnotRule::Literal, &[], &options).is_err());
+        assert!(
+            fit_to_error_refined(
+                z.as_ref(),
+                -1.0,
+                KnotRule::Literal,
+                Layout::Mds,
+                &[],
+                &options
+            )
+            .is_err()
+        );
     }
 }
