@@ -5,6 +5,7 @@
 //! | [`gallop`], [`control`], [`flag`] | Figures 1, 2 and 4 |
 //! | [`editing`], [`resampling`], [`transfer`], [`expressions`] | Figures 5 to 8 |
 //! | [`large_turns`] | halfway to a roll by up to 700 degrees, in every shape space (section 5) |
+//! | [`leave_out`] | in-betweens by layout, staged and refined (section 6) |
 //! | [`signals`] | curves and frames that several of them show |
 //! | [`render`] | triangle meshes as pictures |
 
@@ -14,6 +15,7 @@ pub mod expressions;
 pub mod flag;
 pub mod gallop;
 pub mod large_turns;
+pub mod leave_out;
 pub mod render;
 pub mod resampling;
 pub mod signals;
@@ -131,4 +133,5 @@ pub const ALL: &[(&str, Make)] = &[
     ("figure-7", transfer::exhibit),
     ("figure-8", expressions::exhibit),
     ("large-turns", large_turns::exhibit),
+    ("leave-out", leave_out::exhibit),
 ];

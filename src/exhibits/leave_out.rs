@@ -1,0 +1,151 @@
+//! The leave-out test: every second frame predicted from the others, by layout, staged and refined, beside linear and cubic interpolation.
+
+use super::{Chart, Exhibit, ExhibitError, Line, Panel, Style, Table};
+use crate::mesh::measure::bounds;
+use crate::sequence::Sequence;
+use crate::sequence::dataset::{DataFolders, open};
+use crate::shape::{SpaceKind, prepare_for};
+use crate::signal::knots::KnotRule;
+use crate::signal::layout::Layout;
+use crate::signal::leave_out::{LeaveOut, LeaveOutError, Split};
+use crate::signal::refine::RefineOptions;
+
+const NAME: &str = "leave-out";
+/// Shown always, and in `gradient` as well.
+const EMBEDDED: [&str; 2] = ["@gallop", "@jelly"];
+/// Shown where there is the data: the sequence and how many of its frames are taken.
+const REAL: [(&str, usize); 3] = [("horse-gallop", 23), ("cow", 203), ("samba", usize::MAX)];
+/// Sites and control points of the table's fits, as shares of the frames kept.
+const SHARES: [f64; 2] = [1.0, 0.8];
+/// Those of the chart.
+const TRADE_OFF: [f64; 7] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+const LAYOUTS: [Layout; 2] = [Layout::Mds, Layout::Ordered { weight: None }];
+
+/// A table over sequences, spaces and fits, and the trade-off between sites and in-betweens.
+pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
+    let mut rows = Vec::new();
+    let mut panels = Vec::new();
+    let mut datasets = Vec::new();
+    for name in EMBEDDED {
+        let sequence = open(name)?;
+        for kind in [SpaceKind::Vertex, SpaceKind::Gradient] {
+            rows.push(row(name, &sequence, kind)?);
+        }
+        panels.push(Panel::Chart(trade_off(name, &sequence)?));
+        datasets.push(name.to_owned());
+    }
+    for (name, count) in REAL {
+        let Ok(sequence) = data.sequence(name) else {
+            continue;
+        };
+        let count = count.min(sequence.frame_count());
+        let frames = &sequence.positions()[..count * sequence.dimension()];
+        let sequence = Sequence::new(sequence.connectivity().clone(), count, frames.to_vec())
+            .map_err(ExhibitError::of(NAME))?;
+        rows.push(row(name, &sequence, SpaceKind::Vertex)?);
+        datasets.push(name.to_owned());
+    }
+    panels.insert(0, Panel::Table(table(rows)));
+    Ok(Exhibit {
+        name: NAME.into(),
+        title: "Left out: every second frame predicted from the others".into(),
+        look: "Look for columns of `mds` above `linear`: the plane of plain scaling bends back on itself beside the time signal, and in-betweens stray \
+               from their neighbours although every kept frame is met. `ordered` keeps frames in their order: interpolating or refined it stays below `linear`, \
+               and refined it comes near `cubic` with fewer sites than frames."
+            .into(),
+        datasets,
+        panels,
+    })
+}
+
+fn row(name: &str, sequence: &Sequence, kind: SpaceKind) -> Result<Vec<String>, ExhibitError> {
+    let missed = tested(sequence, kind, |test| {
+        let refinement = RefineOptions::default();
+        let mut missed = vec![test.linear()?.rms, test.cubic()?.rms];
+        for layout in LAYOUTS {
+            for row in test.trade_off(&SHARES, layout, KnotRule::Symmetric, None)? {
+                missed.push(row.missed);
+            }
+            let refined = Some(&refinement);
+            let rows = test.trade_off(&SHARES[1..], layout, KnotRule::Symmetric, refined)?;
+            missed.extend(rows.iter().map(|row| row.missed));
+        }
+        Ok(missed)
+    })?;
+    let size = bounds(sequence.frame(0)).diagonal();
+    let cells = missed.iter().map(|m| format!("{:.3}%", 100.0 * m / size));
+    Ok([format!("{name}, {}", kind.name())]
+        .into_iter()
+        .chain(cells)
+        .collect())
+}
+
+fn tested<T>(
+    sequence: &Sequence,
+    kind: SpaceKind,
+    ask: impl Fn(&LeaveOut) -> Result<T, LeaveOutError>,
+) -> Result<T, ExhibitError> {
+    let answer = || {
+        let split = Split::new(sequence.positions(), sequence.dimension())?;
+        let space = prepare_for(kind, sequence.connectivity(), &split.kept)?;
+        ask(&LeaveOut::new(&*space, &split)?)
+    };
+    answer().map_err(ExhibitError::of(NAME))
+}
+
+fn table(rows: Vec<Vec<String>>) -> Table {
+    let heads = [
+        "sequence",
+        "linear",
+        "cubic",
+        "mds, interpolating",
+        "mds, 80%",
+        "mds, 80% refined",
+        "ordered, interpolating",
+        "ordered, 80%",
+        "ordered, 80% refined",
+    ];
+    Table {
+        caption: "Vertex RMS distance of the predicted frames from those left out, over the first frame's diagonal; k and l are all frames kept, or 80% of them"
+            .into(),
+        heads: heads.map(str::to_owned).to_vec(),
+        rows,
+    }
+}
+
+/// What fewer sites and control points cost, by layout.
+fn trade_off(name: &str, sequence: &Sequence) -> Result<Chart, ExhibitError> {
+    let size = bounds(sequence.frame(0)).diagonal();
+    let percent = |missed: f64| 100.0 * missed / size;
+    let lines = tested(sequence, SpaceKind::Vertex, |test| {
+        let level = |name: &str, missed: f64| Line {
+            name: name.into(),
+            style: Style::Dashes,
+            points: [TRADE_OFF[0], 1.0]
+                .map(|share| [100.0 * share, percent(missed)])
+                .to_vec(),
+        };
+        let mut lines = vec![
+            level("linear", test.linear()?.rms),
+            level("cubic", test.cubic()?.rms),
+        ];
+        for layout in LAYOUTS {
+            let rows = test.trade_off(&TRADE_OFF, layout, KnotRule::Symmetric, None)?;
+            let point = |(row, share): (_, f64)| [100.0 * share, percent(row)];
+            let missed = rows.iter().map(|row| row.missed);
+            lines.push(Line {
+                name: layout.to_string(),
+                style: Style::Line,
+                points: missed.zip(TRADE_OFF).map(point).collect(),
+            });
+        }
+        Ok(lines)
+    })?;
+    Ok(Chart {
+        title: format!("{name}: sites against in-betweens"),
+        x_title: "sites and control points, % of the frames kept".into(),
+        y_title: "predicted frames off by, % of the diagonal".into(),
+        lines,
+        ..Chart::default()
+    })
+}
