@@ -7,7 +7,7 @@ use crate::sequence::dataset::{DataFolders, open};
 use crate::shape::{SpaceKind, prepare_for};
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
-use crate::signal::leave_out::{LeaveOut, LeaveOutError, Split};
+use crate::signal::leave_out::{LeaveOut, LeaveOutError, Split, TradeOff};
 use crate::signal::refine::RefineOptions;
 
 const NAME: &str = "leave-out";
@@ -15,8 +15,8 @@ const NAME: &str = "leave-out";
 const EMBEDDED: [&str; 2] = ["@gallop", "@jelly"];
 /// Shown where there is the data: the sequence and how many of its frames are taken.
 const REAL: [(&str, usize); 3] = [("horse-gallop", 23), ("cow", 203), ("samba", usize::MAX)];
-/// Sites and control points of the table's fits, as shares of the frames kept.
-const SHARES: [f64; 2] = [1.0, 0.8];
+/// Sites and control points of the table's fits that do not interpolate, as a share of the frames kept.
+const FEWER: f64 = 0.8;
 /// Those of the chart.
 const TRADE_OFF: [f64; 7] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 const LAYOUTS: [Layout; 2] = [Layout::Mds, Layout::Ordered { weight: None }];
@@ -63,12 +63,9 @@ fn row(name: &str, sequence: &Sequence, kind: SpaceKind) -> Result<Vec<String>, 
         let refinement = RefineOptions::default();
         let mut missed = vec![test.linear()?.rms, test.cubic()?.rms];
         for layout in LAYOUTS {
-            for row in test.trade_off(&SHARES, layout, KnotRule::Symmetric, None)? {
-                missed.push(row.missed);
-            }
-            let refined = Some(&refinement);
-            let rows = test.trade_off(&SHARES[1..], layout, KnotRule::Symmetric, refined)?;
-            missed.extend(rows.iter().map(|row| row.missed));
+            let interpolating = test.trade_off(&[1.0], layout, KnotRule::Symmetric, None)?;
+            let fewer = test.trade_off(&[FEWER], layout, KnotRule::Symmetric, Some(&refinement))?;
+            missed.extend(interpolating.iter().chain(&fewer).map(|row| row.missed));
         }
         Ok(missed)
     })?;
@@ -131,12 +128,11 @@ fn trade_off(name: &str, sequence: &Sequence) -> Result<Chart, ExhibitError> {
         ];
         for layout in LAYOUTS {
             let rows = test.trade_off(&TRADE_OFF, layout, KnotRule::Symmetric, None)?;
-            let point = |(row, share): (_, f64)| [100.0 * share, percent(row)];
-            let missed = rows.iter().map(|row| row.missed);
+            let point = |row: &TradeOff| [100.0 * row.share, percent(row.missed)];
             lines.push(Line {
                 name: layout.to_string(),
                 style: Style::Line,
-                points: missed.zip(TRADE_OFF).map(point).collect(),
+                points: rows.iter().map(point).collect(),
             });
         }
         Ok(lines)

@@ -65,6 +65,8 @@ pub struct Missed {
 pub struct TradeOff {
     /// The share of the kept frames that k and l were asked to be; 1 interpolates.
     pub share: f64,
+    /// Whether the fit was refined.
+    pub refined: bool,
     /// k, l and m as used.
     pub klm: (usize, usize, usize),
     /// Weight of distances along the motion in the layout.
@@ -144,7 +146,8 @@ impl<'a> LeaveOut<'a> {
         }
     }
 
-    /// The trade-off between sites and in-betweens: the test at each share of sites and control points.
+    /// The trade-off between sites and in-betweens: the test at each share of sites and control points; with a refinement once more, of the same fit
+    /// refined.
     pub fn trade_off(
         &self,
         shares: &[f64],
@@ -152,35 +155,40 @@ impl<'a> LeaveOut<'a> {
         knots: KnotRule,
         refinement: Option<&RefineOptions>,
     ) -> Result<Vec<TradeOff>, LeaveOutError> {
-        let at = |&share: &f64| {
-            let options = self.options(share, layout, knots);
-            let (missed, fit) = self.signals(&options, refinement)?;
-            Ok(TradeOff {
-                share,
-                klm: fit.klm(),
-                weight: fit.layout_weight,
-                missed: missed.rms,
-                errors: fit.errors,
-            })
-        };
-        shares.iter().map(at).collect()
+        let kept = self.kept.as_ref();
+        let mut rows = Vec::new();
+        for &share in shares {
+            let staged = fit(kept, &self.options(share, layout, knots))?;
+            rows.push(self.row(share, false, &staged)?);
+            if let Some(how) = refinement {
+                let (refined, _) = refine(kept, staged, how)?;
+                rows.push(self.row(share, true, &refined)?);
+            }
+        }
+        Ok(rows)
     }
 
-    /// By signals that are fitted to the kept frames, and then refined if asked to.
-    pub fn signals(
-        &self,
-        options: &FitOptions,
-        refinement: Option<&RefineOptions>,
-    ) -> Result<(Missed, Fit), LeaveOutError> {
-        let kept = self.kept.as_ref();
-        let mut fit = fit(kept, options)?;
-        if let Some(how) = refinement {
-            fit = refine(kept, fit, how)?.0;
-        }
+    fn row(&self, share: f64, refined: bool, fit: &Fit) -> Result<TradeOff, LeaveOutError> {
+        Ok(TradeOff {
+            share,
+            refined,
+            klm: fit.klm(),
+            weight: fit.layout_weight,
+            missed: self.signals(fit)?.rms,
+            errors: fit.errors,
+        })
+    }
+
+    /// By signals that were fitted to the kept frames.
+    pub fn signals(&self, fit: &Fit) -> Result<Missed, LeaveOutError> {
+        let kept = &self.kept;
         let times: Vec<f64> = (1..kept.ncols()).map(|i| i as f64 + 0.5).collect();
         let z = fit.representation.evaluate(&times);
-        let z = MatRef::from_column_major_slice(&z, kept.nrows(), times.len());
-        Ok((self.missed(z)?, fit))
+        self.missed(MatRef::from_column_major_slice(
+            &z,
+            kept.nrows(),
+            times.len(),
+        ))
     }
 
     /// How far the frames of these z (d x frames left out) are from the frames left out.
@@ -239,7 +247,9 @@ mod tests {
         let split = Split::new(&frames, 3).unwrap();
         let test = LeaveOut::new(&space, &split).unwrap();
         let options = test.options(1.0, Layout::Mds, KnotRule::Symmetric);
-        let (missed, _) = test.signals(&options, None).unwrap();
+        let missed = test
+            .signals(&fit(test.kept.as_ref(), &options).unwrap())
+            .unwrap();
         for missed in [missed, test.linear().unwrap(), test.cubic().unwrap()] {
             assert!(missed.rms < 1e-12, "{missed:?}");
         }

@@ -83,18 +83,12 @@ impl LeaveOutVerb {
             between: self.between,
             ..RefineOptions::default()
         };
-        let stages: &[bool] = if self.refine {
-            &[false, true]
-        } else {
-            &[false]
-        };
+        let refinement = self.refine.then_some(&refinement);
         let mut fits = Vec::new();
         for &layout in &layouts {
-            for &refined in stages {
-                let how = refined.then_some(&refinement);
-                let rows = test.trade_off(&self.shares, layout, knots, how)?;
-                fits.extend(rows.iter().map(|row| numbers(row, layout, refined, size)));
-            }
+            let mut rows = test.trade_off(&self.shares, layout, knots, refinement)?;
+            rows.sort_by_key(|row| row.refined);
+            fits.extend(rows.iter().map(|row| numbers(row, layout, size)));
         }
         let numbers = json!({
             "n": sequence.frame_count(), "kept": test.kept(), "space": kind.name(), "knots": knots.to_string(),
@@ -110,10 +104,10 @@ impl LeaveOutVerb {
     }
 }
 
-fn numbers(row: &TradeOff, layout: Layout, refined: bool, size: f64) -> Value {
+fn numbers(row: &TradeOff, layout: Layout, size: f64) -> Value {
     let (k, l, m) = row.klm;
     json!({
-        "layout": layout.to_string(), "layout_weight": row.weight, "refined": refined, "share": row.share, "k": k, "l": l, "m": m,
+        "layout": layout.to_string(), "layout_weight": row.weight, "refined": row.refined, "share": row.share, "k": k, "l": l, "m": m,
         "rms_relative": relative(row.missed, size), "error_g": row.errors.g, "error_psi": row.errors.psi,
     })
 }
