@@ -288,6 +288,7 @@ mod tests {
     use crate::sequence::synthetic::embedded;
     use crate::shape::partition::PatchError;
     use crate::shape::patches::choose;
+    use crate::shape::tests::worst;
     use crate::shape::{decode_all, encode_all};
 
     /// Two plates of 8 triangles that share an edge path, the second turned about it by an angle.
@@ -316,14 +317,6 @@ mod tests {
 
     fn mesh(vertices: usize, faces: Vec<[u32; 3]>) -> Arc<Connectivity> {
         Arc::new(Connectivity::new(vertices, faces).unwrap())
-    }
-
-    fn worst(a: &[f64], b: &[f64]) -> f64 {
-        assert_eq!(a.len(), b.len());
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
     }
 
     #[test]

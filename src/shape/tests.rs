@@ -42,7 +42,8 @@ fn moved(frame: &[f64], turn: &Rotation3<f64>, by: Vector3<f64>) -> Vec<f64> {
     )
 }
 
-fn worst(a: &[f64], b: &[f64]) -> f64 {
+/// The greatest difference of two lists of one length.
+pub(super) fn worst(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter()
         .zip(b)

@@ -147,18 +147,26 @@ fn least_k(
     most: f64,
     rule: KnotRule,
 ) -> Result<Option<(usize, Attempt)>, FitError> {
-    let (mut low, mut high) = (4, base.most_control_points());
-    let mut best = base.signals(high, sites, rule)?;
-    if best.errors.psi > most {
-        return Ok(None);
-    }
-    while low < high {
-        let k = (low + high) / 2;
+    least(4, base.most_control_points(), |k| {
         let attempt = base.signals(k, sites, rule)?;
-        if attempt.errors.psi <= most {
-            (high, best) = (k, attempt);
-        } else {
-            low = k + 1;
+        Ok((attempt.errors.psi <= most).then_some(attempt))
+    })
+}
+
+/// The least number from `low` to `high` that will do, and what it gives, by bisection; None where `high` will not.
+pub(super) fn least<T>(
+    mut low: usize,
+    mut high: usize,
+    try_with: impl Fn(usize) -> Result<Option<T>, FitError>,
+) -> Result<Option<(usize, T)>, FitError> {
+    let Some(mut best) = try_with(high)? else {
+        return Ok(None);
+    };
+    while low < high {
+        let middle = (low + high) / 2;
+        match try_with(middle)? {
+            Some(found) => (high, best) = (middle, found),
+            None => low = middle + 1,
         }
     }
     Ok(Some((high, best)))

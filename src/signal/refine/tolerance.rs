@@ -6,7 +6,7 @@ use faer::MatRef;
 
 use super::rows::Rows;
 use super::{RefineOptions, Refinement, minimise_until, refine_within};
-use crate::signal::fidelity::{check, choose, leading, least_m};
+use crate::signal::fidelity::{check, choose, leading, least, least_m};
 use crate::signal::fit::{Attempt, Base, Fit, FitError, error_h};
 use crate::signal::h::{ShapeSignal, shape_signal};
 use crate::signal::knots::KnotRule;
@@ -122,25 +122,6 @@ impl Search<'_> {
             .is_some_and(|error| error <= self.most)
             .then_some(attempt))
     }
-}
-
-/// The least number from `low` to `high` that will do, by bisection; None where `high` will not.
-fn least<T>(
-    mut low: usize,
-    mut high: usize,
-    try_with: impl Fn(usize) -> Result<Option<T>, FitError>,
-) -> Result<Option<(usize, T)>, FitError> {
-    let Some(mut best) = try_with(high)? else {
-        return Ok(None);
-    };
-    while low < high {
-        let middle = (low + high) / 2;
-        match try_with(middle)? {
-            Some(found) => (high, best) = (middle, found),
-            None => low = middle + 1,
-        }
-    }
-    Ok(Some((high, best)))
 }
 
 #[cfg(test)]
