@@ -1,5 +1,6 @@
 //! `verify` and `measure`: run cases, judge, record, report.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -123,10 +124,17 @@ impl Run {
         let mut session = Session::open(options, cases)?;
         let folder = self.folder()?;
         let bar = progress(cases.len());
+        // Many cases lack the same data: how to get at it is told once, for the first of them.
+        let mut told = HashSet::new();
         let mut record = session.run(cases, |event| {
             let line = match event {
                 Event::Judged(case, judged) => line(case, judged),
-                Event::Skipped(case, why) => format!("{:<34} skipped: {why}", case.name),
+                Event::Skipped(case, why) if told.insert(why.to_owned()) => {
+                    format!("{:<34}  skipped: {why}", case.name)
+                }
+                Event::Skipped(case, _) => {
+                    format!("{:<34}  skipped: no data for `{}`", case.name, case.dataset)
+                }
             };
             bar.suspend(|| say(&line));
             bar.inc(1);
