@@ -11,6 +11,7 @@ use meshseq::signal::fit::{FitOptions, fit};
 use meshseq::signal::g::PoseSignal;
 use meshseq::signal::h::shape_signal;
 use meshseq::signal::knots::{KnotRule, knots};
+use meshseq::signal::layout::Layout;
 use meshseq::signal::mds::{Dissimilarities, scale};
 use meshseq::signal::parameters::centripetal;
 use meshseq::signal::pins::{Pin, principal_start};
@@ -174,15 +175,22 @@ fn read(numbers: &[f64]) -> f64 {
     numbers.par_chunks(1 << 16).map(piece).sum()
 }
 
+/// The whole reconstruction with the paper's layout, and with the one that chooses among several.
 fn whole(c: &mut Criterion) {
     let mut group = c.benchmark_group("fit");
     for n in [24, 204, 1000] {
         let z = frames(3000, n);
         let z: MatRef<'_, f64> = z.as_ref();
-        let options = FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3));
-        group.bench_function(BenchmarkId::new("frames, V = 1000", n), |b| {
-            b.iter(|| fit(z, &options).unwrap());
-        });
+        for layout in [Layout::Mds, Layout::default()] {
+            let options = FitOptions {
+                layout,
+                ..FitOptions::new(n * 3 / 4, n * 7 / 10, 40.min(n / 3))
+            };
+            let name = format!("{layout}, V = 1000, frames");
+            group.bench_function(BenchmarkId::new(name, n), |b| {
+                b.iter(|| fit(z, &options).unwrap());
+            });
+        }
     }
 }
 
