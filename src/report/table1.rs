@@ -41,20 +41,20 @@ pub fn source(row: &PublishedRow) -> String {
 fn time<'a>(record: &'a Record, row: &PublishedRow, column: &Column) -> Time<'a> {
     let &(signal, stage, milliseconds) = column;
     let source = source(row);
-    let timed: Vec<&TimingRow> = record
-        .timing
-        .iter()
-        .filter(|t| t.stage == stage && t.published_source == source)
-        .collect();
-    let is_peer = |t: &&&TimingRow| PEERS.iter().any(|p| t.engine.starts_with(p));
-    let peers = timed.iter().filter(is_peer);
+    let is_ours =
+        |t: &&TimingRow| t.engine == RUST && t.stage == stage && t.published_source == source;
+    let ours = record.timing.iter().find(is_ours);
+    // The paper's time stands with our row alone; other engines are of the same case.
+    let is_peer = |t: &&TimingRow| {
+        ours.is_some_and(|ours| ours.case == t.case)
+            && PEERS.iter().any(|p| t.engine.starts_with(p))
+    };
+    let peers = record.timing.iter().filter(is_peer);
     Time {
         signal,
         paper: milliseconds(row) / 1e3,
-        ours: timed.iter().find(|t| t.engine == RUST).copied(),
-        peer: peers
-            .min_by(|a, b| a.ratio_to_rust.total_cmp(&b.ratio_to_rust))
-            .copied(),
+        ours,
+        peer: peers.min_by(|a, b| a.ratio_to_rust.total_cmp(&b.ratio_to_rust)),
     }
 }
 
