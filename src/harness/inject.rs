@@ -237,6 +237,16 @@ faults! {
         Inputs(|inputs| { let (d, e) = (row_length(inputs, "Q"), row_length(inputs, "R")); shorten(inputs, "Q", d); shorten(inputs, "R", e) });
     "transfer-frames" in "signal.transfer": "frames a millionth too large",
         Outputs(|_, out| numbers(out, "W", stretch));
+    "refine-unfinished" in "signal.refine": "the best g and h for the start's curve, which stays",
+        Inputs(|inputs| integers(inputs, "iterations", |steps| steps[0] = 0));
+    "refine-staged" in "signal.refine": "a site a thousandth off, g and h as they were",
+        Outputs(|_, out| numbers(out, "sites", |s| s[0] *= 1.001));
+    "refine-weights" in "signal.refine": "frames between frames weighted as frames",
+        Inputs(|inputs| numbers(inputs, "w", |w| w.fill(1.0)));
+    "refine-claim" in "signal.refine": "the error claimed a millionth too small",
+        Outputs(|_, out| numbers(out, "error", |e| e[0] *= 1.0 - SLIGHT));
+    "refine-dimension-dropped" in "signal.refine": "the last shape coordinate of g at 0",
+        Outputs(|_, out| zero_last_column(out, "g"));
     "signal-other-knots" in "signal": "the other averaging rule",
         Inputs(other_rule);
     "signal-site-dropped" in "signal": "one site fewer",

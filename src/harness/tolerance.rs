@@ -177,6 +177,16 @@ tolerances! {
         "coordinate_difference" <= 1e-9, "least squares by another factorisation: eps times the condition of the examples, squared by the normal equations";
         "frame_difference" <= 1e-9, "as coordinates";
     }
+    "signal.refine" {
+        "claimed_error" <= 1e-9, "the error again by three formulas in a row; kernels and coefficients cancel";
+        "above_start" <= 0.0, "every step goes down";
+        "above_least" <= 1e-9, "g and h are the best there are for their curve, up to what the formulas cancel";
+        "sites_moved" <= 1e-14, "the sites are given; an engine may scale the plane and back";
+        "slope" <= 1e-5, "the error is flat to rounding below the square root of eps, about 1e-8, times the slopes along it";
+        "side_conditions" <= 1e-10, "coefficients come from a null space";
+        "orthonormality" <= 1e-12, "H comes of a singular value decomposition";
+        "error_difference" <= 1e-9, "one minimum, found by two descents to a vanishing gradient";
+    }
     "signal" {
         "claimed_error_psi" <= 1e-9, "error (2) again from the frames";
         "claimed_error_h" <= 1e-10, "error (3) again from singular values";

@@ -10,6 +10,7 @@ mod halfway;
 mod patched;
 mod pipeline;
 mod pose;
+mod refinement;
 mod scaling;
 mod shape;
 mod sparse;
@@ -57,6 +58,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.psi" => (chain::psi_own, chain::psi_against),
         "signal.insert_knots" => (time::more_knots_own, time::more_knots_against),
         "signal.transfer" => (transfer::own, transfer::against),
+        "signal.refine" => (refinement::own, refinement::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };
