@@ -43,6 +43,19 @@ faults! {
         Outputs(|_, out| numbers(out, "hausdorff", stretch));
     "distance-squared" in "sequence.distance": "mean of squared distances",
         Outputs(|_, out| numbers(out, "mean", |m| m.iter_mut().for_each(|x| *x *= *x)));
+    "quality-relative" in "mesh.quality": "areas a millionth too large",
+        Outputs(|_, out| numbers(out, "area", stretch));
+    "quality-inside-out" in "mesh.quality": "the sign of the volumes",
+        Outputs(|_, out| numbers(out, "volume", |v| v.iter_mut().for_each(|x| *x = -*x)));
+    "quality-pair" in "mesh.quality": "one pair more in the last frame",
+        Outputs(|_, out| integers(out, "intersections", |p| { let at = p.len() - 1; p[at] += 1; }));
+    "quality-face" in "mesh.quality": "one triangle fewer in the frame where most meet",
+        Outputs(|_, out| integers(out, "intersecting_faces", |f| if let Some(most) = f.iter_mut().max() { *most -= 1; }));
+    "quality-wrong-frame" in "mesh.quality": "the first frame in place of the second",
+        Inputs(|inputs| {
+            let d = inputs.f64("frames", 3).map_or(0, |(shape, _)| 3 * shape[1]);
+            numbers(inputs, "frames", |x| x.copy_within(..d, d));
+        });
     "gradient-transposed" in "shape.gradient_encode": "rotations the other way round",
         Outputs(|inputs, out| each_triangle(inputs, out, |numbers| numbers[..3].iter_mut().for_each(|x| *x = -*x)));
     "gradient-relative" in "shape.gradient_encode": "stretches a millionth too large",

@@ -64,6 +64,18 @@ pub fn self_intersections(positions: &[f64], faces: &[[u32; 3]]) -> SelfIntersec
     }
 }
 
+/// The same of every frame of n x 3V positions, `dimension` being 3V. Frames run in parallel.
+pub fn self_intersections_of_frames(
+    positions: &[f64],
+    dimension: usize,
+    faces: &[[u32; 3]],
+) -> Vec<SelfIntersections> {
+    let frames = positions.par_chunks_exact(dimension.max(1));
+    frames
+        .map(|frame| self_intersections(frame, faces))
+        .collect()
+}
+
 /// Two triangles that meet.
 struct Meeting {
     faces: [usize; 2],

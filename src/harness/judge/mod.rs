@@ -10,6 +10,7 @@ mod halfway;
 mod patched;
 mod pipeline;
 mod pose;
+mod quality;
 mod refinement;
 mod scaling;
 mod shape;
@@ -37,6 +38,7 @@ fn judge(stage: &str) -> Option<Judge> {
     let (own, against): (Own, Against) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
+        "mesh.quality" => (quality::own, quality::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
         "shape.patch_encode" => (patched::own, patched::against),
