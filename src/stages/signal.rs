@@ -18,14 +18,16 @@ use crate::signal::parameters::{centripetal, distinct};
 use crate::signal::pins::{Pin, principal_start, validate_pins};
 use crate::signal::psi::{Representation, TimeSignal};
 use crate::signal::refine::rows::Rows;
-use crate::signal::refine::{RefineOptions, minimise};
+use crate::signal::refine::{RefineOptions, Signals, minimise};
 use crate::signal::rho::Rho;
 use crate::signal::sites::site_order;
 use crate::signal::transfer::{ExampleBasis, frames_of_coordinates};
 
 /// The most steps of a refinement that is judged, and the share below which steps gain nothing.
 const STEPS: usize = 2000;
-const EXACT: f64 = 1e-13;
+const EXACT: f64 = 1e-15;
+/// What a refinement without a start says.
+const NOTHING: &str = "there is nothing to refine: fewer than three sites, or functions that are dependent along the curve";
 
 /// In the order of the paper.
 pub static STAGES: &[Stage] = &[
@@ -432,20 +434,24 @@ fn refine(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     call(
         move || {
             let found = minimise(&rows, &spline, &sites, m, &options);
-            found.ok_or_else(|| StageError::Failed("there is nothing to refine".into()))
+            found.ok_or_else(|| StageError::Failed(NOTHING.into()))
         },
         |found| {
-            let s = &found.signals;
-            Bundle::from([
-                ("h0", Array::vector(&s.offset)),
-                ("H", Array::columns(s.basis.as_ref())),
-                ("sites", Array::points(&s.pose.sites)),
-                ("g", Array::columns(s.pose.coefficients.as_ref())),
-                ("control", Array::points(&s.spline.control)),
-                ("error", Array::vector(&[found.error])),
-            ])
+            let mut outputs = signal_arrays(&found.signals);
+            outputs.put("error", Array::vector(&[found.error]));
+            outputs
         },
     )
+}
+
+fn signal_arrays(s: &Signals) -> Bundle {
+    Bundle::from([
+        ("h0", Array::vector(&s.offset)),
+        ("H", Array::columns(s.basis.as_ref())),
+        ("sites", Array::points(&s.pose.sites)),
+        ("g", Array::columns(s.pose.coefficients.as_ref())),
+        ("control", Array::points(&s.spline.control)),
+    ])
 }
 
 fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
@@ -599,18 +605,25 @@ impl<'a> Chain<'a> {
         })
     }
 
-    /// The staged fit in the coordinates of all principal components of the frames.
+    /// A fit in the coordinates of all principal components of the frames, refined already with its sites held, but not to the end: the error has
+    /// several minima, and the one that two engines find must be the same.
     fn refinement(&self, frames: MatRef<'_, f64>) -> Result<Bundle, StageError> {
         let whole = shape_signal(frames, frames.ncols().saturating_sub(1))
             .map_err(StageError::from_error)?;
         let psi = &self.fit.representation;
         let between = RefineOptions::default().between;
         let rows = Rows::of_frames(whole.coordinates.as_ref(), &psi.time.parameters, between);
-        // The offset of both is the mean frame.
-        let mut inputs = representation_arrays(psi);
-        inputs.put("h0", Array::vector(&vec![0.0; whole.basis.ncols()]));
-        let basis = whole.basis.transpose() * &psi.basis;
-        inputs.put("H", Array::columns(basis.as_ref()));
+        let options = RefineOptions {
+            hold_sites: true,
+            ..RefineOptions::default()
+        };
+        let (spline, sites) = (&psi.time.spline, &psi.pose.sites);
+        let near = minimise(&rows, spline, sites, self.choice.m, &options);
+        let near = near
+            .ok_or_else(|| StageError::Failed(NOTHING.into()))?
+            .signals;
+        let mut inputs = signal_arrays(&near);
+        inputs.put("u", Array::vector(&near.spline.knots));
         inputs.put("Y", Array::columns(rows.targets.transpose()));
         inputs.put("t", Array::vector(&rows.parameters));
         inputs.put("w", Array::vector(&rows.weights));
