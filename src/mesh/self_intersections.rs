@@ -1,6 +1,7 @@
 //! Where a surface meets itself, decided exactly for the coordinates as they are.
 
 use std::cmp::Ordering::{self, Equal, Greater, Less};
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -11,8 +12,8 @@ use super::vector::{Point, point};
 
 /// The corners at both ends of each edge of a triangle.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
-/// Triangles that a thread takes at a time, at least.
-const SHARE: usize = 64;
+/// Leaves that a thread takes at a time, at least.
+const SHARE: usize = 16;
 
 /// How a surface meets itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -46,9 +47,11 @@ pub fn self_intersections(positions: &[f64], faces: &[[u32; 3]]) -> SelfIntersec
         triangles,
         nodes,
     };
-    let count = surface.triangles.len();
-    let each = (0..count).into_par_iter().with_min_len(SHARE);
-    let found: Vec<Meeting> = each.flat_map_iter(|i| surface.meetings(i)).collect();
+    let leaves: Vec<(&Node, Range<usize>)> = surface.leaves().collect();
+    let leaves = leaves.into_par_iter().with_min_len(SHARE);
+    let found: Vec<Meeting> = leaves
+        .flat_map_iter(|(leaf, range)| surface.meetings(&leaf.bounds, range))
+        .collect();
     let mut marked = vec![false; faces.len()];
     for face in found.iter().flat_map(|meeting| meeting.faces) {
         marked[face] = true;
@@ -94,23 +97,32 @@ struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// The triangles after `i` that meet it.
-    fn meetings(&self, i: usize) -> Vec<Meeting> {
-        let around = &self.boxes[i];
+    /// Every leaf with the range of its triangles.
+    fn leaves(&self) -> impl Iterator<Item = (&Node, Range<usize>)> {
+        self.nodes.iter().filter_map(|node| match node.kind {
+            Kind::Leaf { from, to } => Some((node, from..to)),
+            Kind::Inner { .. } => None,
+        })
+    }
+
+    /// Meetings of the triangles of a leaf with each other and with those of later leaves.
+    fn meetings(&self, around: &Bounds, leaf: Range<usize>) -> Vec<Meeting> {
         let mut found = Vec::new();
         let mut open = [0; DEPTH];
         let mut count = 1;
         while count > 0 {
             count -= 1;
             let node = &self.nodes[open[count]];
-            if !overlap(&node.bounds, around) {
+            if node.to <= leaf.start || !overlap(&node.bounds, around) {
                 continue;
             }
             match node.kind {
                 Kind::Leaf { from, to } => {
-                    let later = from.max(i + 1)..to.max(i + 1);
-                    let near = later.filter(|&j| overlap(&self.boxes[j], around));
-                    found.extend(near.filter_map(|j| self.meeting(i, j)));
+                    for i in leaf.clone() {
+                        let later = from.max(i + 1)..to;
+                        let near = later.filter(|&j| overlap(&self.boxes[j], &self.boxes[i]));
+                        found.extend(near.filter_map(|j| self.meeting(i, j)));
+                    }
                 }
                 Kind::Inner { second } => {
                     (open[count], open[count + 1]) = (second, open[count] + 1);
@@ -167,22 +179,22 @@ fn along_axis(p: Point, axis: usize) -> [f64; 2] {
 
 /// Whether two triangles of positive area have a point in common: an edge of one then meets the other.
 fn triangles_meet(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    let sides_of_b = sides(a, b);
+    let sides_of_b = sides(a, *b);
     if all_beside(&sides_of_b) {
         return false;
     }
-    let sides_of_a = sides(b, a);
+    let sides_of_a = sides(b, *a);
     !all_beside(&sides_of_a)
         && (an_edge_meets(b, &sides_of_b, a) || an_edge_meets(a, &sides_of_a, b))
 }
 
-/// On which side of the plane of `triangle` the corners of the other are.
-fn sides(triangle: &[Point; 3], other: &[Point; 3]) -> [Ordering; 3] {
+/// On which side of the plane of `triangle` points are.
+fn sides<const N: usize>(triangle: &[Point; 3], points: [Point; N]) -> [Ordering; N] {
     let [a, b, c] = *triangle;
-    other.map(|p| side_of_plane(a, b, c, p))
+    points.map(|p| side_of_plane(a, b, c, p))
 }
 
-fn all_beside(sides: &[Ordering; 3]) -> bool {
+fn all_beside(sides: &[Ordering]) -> bool {
     sides[0] != Equal && sides.iter().all(|side| *side == sides[0])
 }
 
@@ -192,14 +204,19 @@ fn an_edge_meets(a: &[Point; 3], sides: &[Ordering; 3], b: &[Point; 3]) -> bool 
         .any(|&[i, j]| segment_meets([a[i], a[j]], [sides[i], sides[j]], b))
 }
 
-/// Whether two triangles, of which corner i of one is corner j of the other, meet in more than this corner: the edge across from it meets the other.
+/// Whether two triangles, of which corner i of one is corner j of the other, meet in more than this corner: the edge across from it meets the other. One that
+/// is all beside the other's plane does not.
 fn meet_beyond(a: &[Point; 3], i: usize, b: &[Point; 3], j: usize) -> bool {
     let across = |t: &[Point; 3], corner: usize| [t[(corner + 1) % 3], t[(corner + 2) % 3]];
-    let meets = |edge: [Point; 2], triangle: &[Point; 3]| {
-        let [a, b, c] = *triangle;
-        segment_meets(edge, edge.map(|p| side_of_plane(a, b, c, p)), triangle)
-    };
-    meets(across(a, i), b) || meets(across(b, j), a)
+    let edge_a = across(a, i);
+    let sides_a = sides(b, edge_a);
+    if all_beside(&sides_a) {
+        return false;
+    }
+    let edge_b = across(b, j);
+    let sides_b = sides(a, edge_b);
+    !all_beside(&sides_b)
+        && (segment_meets(edge_a, sides_a, b) || segment_meets(edge_b, sides_b, a))
 }
 
 /// Whether a segment, its ends on these sides of the triangle's plane, has a point in common with the triangle.

@@ -11,6 +11,8 @@ pub(super) const DEPTH: usize = 65;
 /// A box around some triangles.
 pub(super) struct Node {
     pub bounds: Bounds,
+    /// After the last of them.
+    pub to: usize,
     pub kind: Kind,
 }
 
@@ -36,6 +38,7 @@ pub(super) fn build(triangles: &mut [(usize, [Point; 3])]) -> Vec<Node> {
         let corners = part.iter().flat_map(|(_, t)| t);
         nodes.push(Node {
             bounds: corners.fold(Bounds::EMPTY, |all, &p| all.with(p)),
+            to,
             kind: Kind::Leaf { from, to },
         });
         if part.len() > LEAF {
