@@ -4,13 +4,14 @@
 //! or too small for that, the determinant is summed in whole numbers.
 
 use std::cmp::Ordering;
+use std::ops::RangeInclusive;
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::vector::Point;
 
 /// Magnitudes, beside 0, for which Shewchuk proves his predicates exact: exponents from -142 to 201.
-const PROVEN: [f64; 2] = [1.8e-43, 3.2e60];
+const PROVEN: RangeInclusive<f64> = 1.8e-43..=3.2e60;
 
 /// The sign of det[a-c b-c]: whether a, b, c turn counter-clockwise (`Greater`), clockwise, or are in a line (`Equal`).
 pub(super) fn side_of_line(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
@@ -44,7 +45,7 @@ pub(super) fn side_of_plane(a: Point, b: Point, c: Point, d: Point) -> Ordering 
 
 fn proven(x: &f64) -> bool {
     let size = x.abs();
-    size == 0.0 || (PROVEN[0] <= size && size <= PROVEN[1])
+    size == 0.0 || PROVEN.contains(&size)
 }
 
 fn sign(determinant: f64) -> Ordering {
