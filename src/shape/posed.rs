@@ -62,6 +62,21 @@ fn plane_map(rest: &Triangle, length: f64, foot: f64, height: f64) -> [[f64; 2];
     ]
 }
 
+/// The stretch of a triangle with these sides ab, bc and ca, none below 0. Sides that make no triangle make the flat one whose ab and ca are as given.
+pub fn stretch_of_sides(rest: &Triangle, [ab, bc, ca]: [f64; 3]) -> Stretch {
+    if ab == 0.0 {
+        return plane_polar(plane_map(rest, 0.0, ca, 0.0)).stretch;
+    }
+    // Heron's formula, and the law of cosines, without cancellation where they can do without (Kahan 2014).
+    let mut sides = [ab, bc, ca];
+    sides.sort_unstable_by(|a, b| b.total_cmp(a));
+    let [a, b, c] = sides;
+    let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
+    let foot = 0.5 * (ab + (ca - bc) / ab * (ca + bc));
+    let height = 0.5 * product.max(0.0).sqrt() / ab;
+    plane_polar(plane_map(rest, ab, foot.clamp(-ca, ca), height)).stretch
+}
+
 fn across(x: Point, axis: Point) -> Point {
     let once = along(x, -dot(x, axis), axis);
     // Once more, because a thin triangle leaves little.

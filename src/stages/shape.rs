@@ -32,6 +32,16 @@ pub static STAGES: &[Stage] = &[
         prepare: |inputs| decode(SpaceKind::Lric, inputs),
     },
     Stage {
+        name: "shape.lengths_encode",
+        about: "lengths and dihedral angles of edges (section 5; Winkler et al. 2010, Froehlich & Botsch 2011)",
+        prepare: |inputs| encode(SpaceKind::Lengths, inputs),
+    },
+    Stage {
+        name: "shape.lengths_decode",
+        about: "frames from lengths and dihedral angles by nonlinear least squares (section 5)",
+        prepare: |inputs| decode(SpaceKind::Lengths, inputs),
+    },
+    Stage {
         name: "shape.patch_encode",
         about: "gradients against the mean rotations of patches, those against adjacent ones (section 5; Baran et al. 2009)",
         prepare: |inputs| encode(SpaceKind::Patch, inputs),
