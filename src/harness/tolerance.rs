@@ -217,12 +217,29 @@ const SINGLE: [(&str, f64, &str); 3] = [
     ),
 ];
 
+/// Engines that take dihedral angles as arccosines, which near 0 and pi have half the digits.
+const ARCCOSINE: ([&str; 2], f64, &str) = (
+    ["trimesh", "openmesh"],
+    5e-8,
+    "the arccosine of a dot product next to 1 is good to the root of its rounding",
+);
+
 /// The tolerance of a quantity, none where it is only reported.
 pub fn find(stage: &str, quantity: &str, engine: &str) -> Option<Tolerance> {
     if quantity == "gradient" && engine == "rust" {
         return Some(Tolerance {
             value: RUST_GRADIENT,
             reason: "Newton's method ends at a vanishing gradient (reading 6)".into(),
+        });
+    }
+    let (arccosine, value, reason) = ARCCOSINE;
+    if stage == "shape.lengths_encode"
+        && quantity.starts_with("angle")
+        && arccosine.contains(&engine)
+    {
+        return Some(Tolerance {
+            value,
+            reason: reason.into(),
         });
     }
     let entry = TOLERANCES

@@ -22,8 +22,10 @@ const FACTORISATIONS: usize = 100;
 /// The damping to start with, beside second derivatives in the order of 1, and the least.
 const DAMPING: f64 = 1e-6;
 const LEAST_DAMPING: f64 = 1e-12;
+/// The damping at which a descent has no step left to take: E falls towards a triangle without height, at which its angles, and E, jump.
+const MOST_DAMPING: f64 = 1e4;
 /// Differences of so much, root mean square, are rounding.
-const ROUNDING: f64 = 1e-13;
+const ROUNDING: f64 = 1e-12;
 /// A step taken lowers E by at least this share of what was predicted.
 const GAIN: f64 = 1e-4;
 /// E cannot tell steps that lower it by less than this share of itself.
@@ -136,9 +138,11 @@ impl Shell {
         let (edges, bends) = (edges.collect(), bends.collect());
         let places: Vec<[u32; 2]> = (0..vertices as u32)
             .flat_map(|v| LOWER.map(|[r, c]| [3 * v + r as u32, 3 * v + c as u32]))
-            .chain(couplings.iter().flat_map(|&[a, b]| {
-                (0..9).map(move |i| [3 * a + i / 3, 3 * b + i % 3])
-            }))
+            .chain(
+                couplings
+                    .iter()
+                    .flat_map(|&[a, b]| (0..9).map(move |i| [3 * a + i / 3, 3 * b + i % 3])),
+            )
             .collect();
         Ok(Self {
             pattern: Pattern::new(3 * vertices, &places)?,
@@ -240,6 +244,9 @@ impl Shell {
                 }
                 damping *= growth;
                 growth *= 2.0;
+                if damping > MOST_DAMPING {
+                    return Ok(found);
+                }
             }
         }
         found.imbalance = 0.0;
@@ -247,13 +254,7 @@ impl Shell {
     }
 
     /// Writes what lengths and angles in a frame are off the given ones; the sum of their squares.
-    fn differences(
-        &self,
-        lengths: &[f64],
-        angles: &[f64],
-        x: &[Point],
-        out: &mut Vec<f64>,
-    ) -> f64 {
+    fn differences(&self, lengths: &[f64], angles: &[f64], x: &[Point], out: &mut Vec<f64>) -> f64 {
         let length = |edge: &Edge| {
             let [a, b] = edge.ends.map(|v| x[v as usize]);
             norm(sub(b, a))

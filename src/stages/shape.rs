@@ -172,8 +172,10 @@ pub fn inputs(stage: &str, sequence: &Sequence, choice: &Choice) -> Result<Bundl
     let space = prepare(kind, mesh, sequence.frame(0), &labels).map_err(StageError::from_error)?;
     let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
-    let between = z.subcols(0, n - 1) + z.subcols(1, n - 1);
-    let z = faer::concat![[z, 0.5 * between]];
+    let z = match choice.means {
+        true => faer::concat![[&z, 0.5 * (z.subcols(0, n - 1) + z.subcols(1, n - 1))]],
+        false => z,
+    };
     inputs.put("z", Array::columns(z.as_ref()));
     inputs.put("truth", frames);
     Ok(inputs)

@@ -42,7 +42,10 @@ impl Layout {
 
     /// The mean edge length of the reference.
     fn unit(&self, reference: Vertices) -> f64 {
-        let lengths = self.lengths.iter().map(|(ends, _)| chord(reference, *ends).norm());
+        let lengths = self
+            .lengths
+            .iter()
+            .map(|(ends, _)| chord(reference, *ends).norm());
         lengths.sum::<f64>() / self.lengths.len() as f64
     }
 
@@ -176,7 +179,10 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
     for &(ends, place) in &layout.lengths {
         let along = chord(frame, ends);
         let direction = along.normalize();
-        add(along.norm() / unit - z[place], &[(ends[0], -direction), (ends[1], direction)]);
+        add(
+            along.norm() / unit - z[place],
+            &[(ends[0], -direction), (ends[1], direction)],
+        );
     }
     for pair in layout.sound_pairs(mesh) {
         let gap = dihedral(frame, &mesh.faces, pair) - z[pair.place];
@@ -184,14 +190,23 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
         let e = chord(frame, [i, j]) / unit;
         // The vertex across turns the angle by -1 over its height; the ends of the edge balance it.
         let part = |triangle: usize| {
-            let across = mesh.faces[triangle].iter().copied().find(|v| ![i, j].contains(v));
+            let across = mesh.faces[triangle]
+                .iter()
+                .copied()
+                .find(|v| ![i, j].contains(v));
             let k = across.unwrap_or(i);
             let p = chord(frame, [i, k]) / unit;
-            let (height, s) = ((p - e * (p.dot(&e) / e.norm_squared())).norm(), p.dot(&e) / e.norm_squared());
+            let (height, s) = (
+                (p - e * (p.dot(&e) / e.norm_squared())).norm(),
+                p.dot(&e) / e.norm_squared(),
+            );
             (k, p, height, s)
         };
         let [f, g] = pair.triangles.map(part);
-        let (up, down) = (e.cross(&f.1).normalize() / f.2, g.1.cross(&e).normalize() / g.2);
+        let (up, down) = (
+            e.cross(&f.1).normalize() / f.2,
+            g.1.cross(&e).normalize() / g.2,
+        );
         add(
             gap - TAU * (gap / TAU).round(),
             &[
@@ -207,7 +222,13 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
         return [0.0, rms];
     }
     let cosine = |slope: f64, square: f64| slope.abs() / (square * energy).sqrt();
-    let all = slopes.iter().flat_map(|[slope, square]| slope.iter().zip(square.iter()));
+    let all = slopes
+        .iter()
+        .flat_map(|[slope, square]| slope.iter().zip(square.iter()));
     let held = all.filter(|(_, square)| **square > 0.0);
-    [held.map(|(slope, square)| cosine(*slope, *square)).fold(0.0, f64::max), rms]
+    [
+        held.map(|(slope, square)| cosine(*slope, *square))
+            .fold(0.0, f64::max),
+        rms,
+    ]
 }
