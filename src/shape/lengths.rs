@@ -11,15 +11,17 @@ use std::sync::Arc;
 use super::lric::unwrap_angles;
 use super::placement;
 use super::pool::Pool;
-use super::posed::{Stretch, UNSTRETCHED, stretch_of_sides};
+use super::posed::{Stretch, UNSTRETCHED, area_of_sides, stretch_of_sides};
 use super::reference::{Reference, check, check_len};
-use super::shell::{Descent, Shell};
+use super::shell::{Descent, Shell, Target};
 use super::surface::Surface;
 use super::{ShapeError, Space, SpaceKind};
 use crate::mesh::Connectivity;
 use crate::mesh::topology::Topology;
 use crate::mesh::vector::{Point, norm, point, sub};
 
+/// The share of the area that given lengths make of a triangle below which decoding holds against it.
+const LEAST_AREA: f64 = 0.1;
 /// Numbers of an edge of one or two triangles.
 const NUMBERS: usize = 2;
 
@@ -48,6 +50,7 @@ struct Work {
     stretch: Vec<Stretch>,
     lengths: Vec<f64>,
     angles: Vec<f64>,
+    areas: Vec<f64>,
     points: Vec<Point>,
 }
 
@@ -77,8 +80,12 @@ impl LengthsSpace {
         let held: Vec<_> = edges.iter().filter(inside).copied().collect();
         let ends: Vec<_> = held.iter().map(|&(ends, _)| ends).collect();
         let hinges: Vec<_> = surface.hinges().iter().map(|h| h.corners).collect();
+        let faces = reference.faces().iter().zip(&reference.triangles);
+        let faces: Vec<_> = faces
+            .filter_map(|(&face, rest)| rest.as_ref().map(|_| face))
+            .collect();
         Ok(Self {
-            shell: Shell::new(reference.vertex_count(), &ends, &hinges)?,
+            shell: Shell::new(reference.vertex_count(), &ends, &hinges, &faces)?,
             unit: mean_length(&reference.positions, &edges),
             surface,
             lengths: held.iter().map(|&(_, slot)| slot).collect(),
@@ -107,14 +114,22 @@ impl LengthsSpace {
             work.lengths.extend(self.lengths.iter().map(number));
             work.angles.clear();
             work.angles.extend(self.angles.iter().map(number));
+            work.areas.clear();
+            work.areas.extend(self.solid_sides().map(|sides| {
+                let lengths = sides.map(|slot| edges[slot as usize].max(0.0));
+                LEAST_AREA * area_of_sides(lengths)
+            }));
             // In mean edge lengths, as the given ones.
             let vertices = positions.as_chunks::<3>().0.iter();
             work.points.clear();
             work.points
                 .extend(vertices.map(|p| p.map(|x| x / self.unit)));
-            let found = self
-                .shell
-                .descend(&work.lengths, &work.angles, &mut work.points)?;
+            let target = Target {
+                lengths: &work.lengths,
+                angles: &work.angles,
+                areas: &work.areas,
+            };
+            let found = self.shell.descend(&target, &mut work.points)?;
             if found.factorisations > 0 {
                 let scaled = work.points.as_flattened().iter().map(|x| x * self.unit);
                 positions.iter_mut().zip(scaled).for_each(|(x, y)| *x = y);
@@ -122,6 +137,12 @@ impl LengthsSpace {
             }
             Ok(found)
         })
+    }
+
+    /// Where the lengths of the sides of triangles that are not degenerate are.
+    fn solid_sides(&self) -> impl Iterator<Item = [u32; 3]> {
+        let triangles = self.reference.triangles.iter().zip(&self.sides);
+        triangles.filter_map(|(rest, &sides)| rest.as_ref().and(sides))
     }
 
     /// The stretch of every triangle with these sides; lengths below 0 count 0.
@@ -183,7 +204,11 @@ fn length(positions: &[f64], ends: [u32; 2]) -> f64 {
 
 /// 1 where it would be 0.
 fn mean_length(positions: &[f64], edges: &[([u32; 2], u32)]) -> f64 {
-    let sum: f64 = edges.iter().map(|&(ends, _)| length(positions, ends)).sum();
+    // Sums of sums, so that rounding does not grow with the number of edges.
+    let some = |edges: &[([u32; 2], u32)]| -> f64 {
+        edges.iter().map(|&(ends, _)| length(positions, ends)).sum()
+    };
+    let sum: f64 = edges.chunks(256).map(some).sum();
     match sum > 0.0 {
         true => sum / edges.len() as f64,
         false => 1.0,

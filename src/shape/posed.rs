@@ -67,14 +67,17 @@ pub fn stretch_of_sides(rest: &Triangle, [ab, bc, ca]: [f64; 3]) -> Stretch {
     if ab == 0.0 {
         return plane_polar(plane_map(rest, 0.0, ca, 0.0)).stretch;
     }
-    // Heron's formula, and the law of cosines, without cancellation where they can do without (Kahan 2014).
-    let mut sides = [ab, bc, ca];
+    let foot = 0.5 * (ab + (ca - bc) / ab * (ca + bc));
+    let height = 2.0 * area_of_sides([ab, bc, ca]) / ab;
+    plane_polar(plane_map(rest, ab, foot.clamp(-ca, ca), height)).stretch
+}
+
+/// The area of a triangle with these sides, 0 where they make none: Heron's formula without cancellation (Kahan 2014).
+pub fn area_of_sides(mut sides: [f64; 3]) -> f64 {
     sides.sort_unstable_by(|a, b| b.total_cmp(a));
     let [a, b, c] = sides;
     let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
-    let foot = 0.5 * (ab + (ca - bc) / ab * (ca + bc));
-    let height = 0.5 * product.max(0.0).sqrt() / ab;
-    plane_polar(plane_map(rest, ab, foot.clamp(-ca, ca), height)).stretch
+    0.25 * product.max(0.0).sqrt()
 }
 
 fn across(x: Point, axis: Point) -> Point {

@@ -1,8 +1,11 @@
 //! The frame whose edge lengths and dihedral angles are nearest to given ones: a nonlinear least squares over the vertices (Froehlich & Botsch 2011, their
 //! equation (3) without the term of volume and with weights 1).
 //!
-//! x minimises E(x) = sum over edges (|x_j - x_i| - l)^2 + sum over hinges (theta(x) - a)^2, differences of angles modulo 2 pi. A step solves
-//! (H + damping) step = -J^T r, r the differences and J their derivatives, by a sparse factorisation whose pattern is analysed once. H is the whole
+//! x minimises E(x) = sum over edges (|x_j - x_i| - l)^2 + sum over hinges (theta(x) - a)^2 + sum over triangles max(0, ln(A / area(x)))^2, differences of
+//! angles modulo 2 pi. The last sum is ours: lengths and angles of no surface would flatten some triangle, at whose flat shape its angles jump, so that E has
+//! no minimum there; A is the least area that the triangle keeps without a cost. A step solves
+//! (H + damping D) step = -J^T r, r the differences, J their derivatives and D the diagonal of J^T J, by a sparse factorisation whose pattern is analysed
+//! once. H is the whole
 //! second derivative J^T J + sum r r'' (Newton) where that, damped, is positive definite, and J^T J (Gauss-Newton) where it is not: vectors of no frame
 //! leave differences, and Gauss-Newton alone then creeps, as slowly as these times the curvature of the angles are large. Damping follows how well E was predicted
 //! (Nielsen 1999). It also holds what E leaves free, the rigid motions of components.
@@ -15,14 +18,16 @@ use super::reference::check;
 use crate::linalg::kernels::dot as product;
 use crate::linalg::sparse::{Factor, FactorError, Pattern};
 use crate::mesh::dihedral::{Block, Lean, dihedral_angle};
-use crate::mesh::vector::{Point, norm, sub};
+use crate::mesh::vector::{Point, cross, dot, norm, sub};
 
 /// The most factorisations.
 const FACTORISATIONS: usize = 100;
-/// The damping to start with, beside second derivatives in the order of 1, and the least.
+/// See [`weight`].
+const LEAST_WEIGHT: f64 = 1e-6;
+/// The damping to start with, and the least.
 const DAMPING: f64 = 1e-6;
 const LEAST_DAMPING: f64 = 1e-12;
-/// The damping at which a descent has no step left to take: E falls towards a triangle without height, at which its angles, and E, jump.
+/// The damping at which a descent has no step left to take, as where E falls towards a triangle without height, at which its angles jump.
 const MOST_DAMPING: f64 = 1e4;
 /// Differences of so much, root mean square, are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -33,12 +38,24 @@ const UNTOLD: f64 = 1e-14;
 /// See [`Descent::imbalance`].
 const STATIONARY: f64 = 1e-9;
 
+/// What a frame should have; see the energy above.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// Of every edge.
+    pub lengths: &'a [f64],
+    /// Of every hinge, radians.
+    pub angles: &'a [f64],
+    /// Of every triangle the least area; 0 where there is none.
+    pub areas: &'a [f64],
+}
+
 /// The terms of one mesh, and where they add to the second derivatives.
 #[derive(Debug)]
 pub struct Shell {
     vertices: usize,
     edges: Vec<Edge>,
     bends: Vec<Bend>,
+    triangles: Vec<Triangle>,
     /// Pairs of different vertices of one term, the smaller first.
     couplings: Vec<[u32; 2]>,
     pattern: Pattern,
@@ -58,6 +75,15 @@ struct Bend {
     /// Of the pairs of corners in [`PAIRS`]; any number for one vertex twice.
     couplings: [u32; 6],
 }
+
+#[derive(Clone, Copy, Debug)]
+struct Triangle {
+    corners: [u32; 3],
+    /// Of the pairs of corners in [`SIDES`].
+    couplings: [u32; 3],
+}
+
+const SIDES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
 const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
@@ -81,7 +107,7 @@ impl Descent {
 
 #[derive(Debug, Default)]
 struct Work {
-    /// Of edges, then of hinges.
+    /// Of edges, of hinges, then of triangles.
     differences: Vec<f64>,
     trial: Vec<Point>,
     trial_differences: Vec<f64>,
@@ -111,18 +137,27 @@ enum Second {
 }
 
 impl Shell {
-    /// Over edges (the smaller vertex first) and hinges (see [`crate::mesh::dihedral`]) of vertices below `vertices`. Costs the analysis of a sparse
+    /// Over edges (the smaller vertex first), hinges (see [`crate::mesh::dihedral`]) and triangles of vertices below `vertices`. Costs the analysis of a sparse
     /// system of three unknowns a vertex.
     pub fn new(
         vertices: usize,
         edges: &[[u32; 2]],
         hinges: &[[u32; 4]],
+        triangles: &[[u32; 3]],
     ) -> Result<Self, ShapeError> {
         let ordered = |a: u32, b: u32| [a.min(b), a.max(b)];
         let at_hinges = hinges
             .iter()
             .flat_map(|c| PAIRS.map(|[p, q]| ordered(c[p], c[q])));
-        let mut couplings: Vec<_> = edges.iter().copied().chain(at_hinges).collect();
+        let at_triangles = triangles
+            .iter()
+            .flat_map(|c| SIDES.map(|[p, q]| ordered(c[p], c[q])));
+        let mut couplings: Vec<_> = edges
+            .iter()
+            .copied()
+            .chain(at_hinges)
+            .chain(at_triangles)
+            .collect();
         couplings.retain(|[a, b]| a != b);
         couplings.sort_unstable();
         couplings.dedup();
@@ -135,7 +170,11 @@ impl Shell {
             corners,
             couplings: PAIRS.map(|[p, q]| find(ordered(corners[p], corners[q]))),
         });
-        let (edges, bends) = (edges.collect(), bends.collect());
+        let triangles = triangles.iter().map(|&corners| Triangle {
+            corners,
+            couplings: SIDES.map(|[p, q]| find(ordered(corners[p], corners[q]))),
+        });
+        let (edges, bends, triangles) = (edges.collect(), bends.collect(), triangles.collect());
         let places: Vec<[u32; 2]> = (0..vertices as u32)
             .flat_map(|v| LOWER.map(|[r, c]| [3 * v + r as u32, 3 * v + c as u32]))
             .chain(
@@ -149,27 +188,21 @@ impl Shell {
             vertices,
             edges,
             bends,
+            triangles,
             couplings,
             work: Pool::default(),
         })
     }
 
-    /// Descends from `x` to a frame with these lengths of edges and angles of hinges, in their order. O(V) a step beside the factorisation.
-    pub fn descend(
-        &self,
-        lengths: &[f64],
-        angles: &[f64],
-        x: &mut [Point],
-    ) -> Result<Descent, ShapeError> {
-        self.work
-            .lend(|work| self.descend_with(work, lengths, angles, x))
+    /// Descends from `x` towards the target. O(V) a step beside the factorisation.
+    pub fn descend(&self, target: &Target, x: &mut [Point]) -> Result<Descent, ShapeError> {
+        self.work.lend(|work| self.descend_with(work, target, x))
     }
 
     fn descend_with(
         &self,
         work: &mut Work,
-        lengths: &[f64],
-        angles: &[f64],
+        target: &Target,
         x: &mut [Point],
     ) -> Result<Descent, ShapeError> {
         let Work {
@@ -179,11 +212,16 @@ impl Shell {
             ..
         } = work;
         let mut found = Descent {
-            energy: self.differences(lengths, angles, x, differences),
+            energy: self.differences(target, x, differences),
             imbalance: 0.0,
             factorisations: 0,
         };
         check("frame decoded", x.as_flattened(), 3 * self.vertices)?;
+        if !found.energy.is_finite() {
+            // A triangle that should have an area has none: there is no way down from here.
+            found.imbalance = f64::INFINITY;
+            return Ok(found);
+        }
         let rounding = ROUNDING * ROUNDING * differences.len() as f64;
         let (mut damping, mut growth) = (DAMPING, 2.0);
         while found.energy > rounding {
@@ -216,13 +254,16 @@ impl Shell {
                     }
                 }
                 let gradient = work.system.gradient.as_flattened();
-                let (slope, square) = (product(gradient, step), product(step, step));
+                let slope = product(gradient, step);
+                let squares = work.system.squares.as_flattened().iter();
+                let held = squares.zip(&*step);
+                let square: f64 = held.map(|(s, step)| weight(*s) * step * step).sum();
                 let predicted = damping * square - slope;
                 trial.clear();
                 trial.extend_from_slice(x);
                 let moved = trial.as_flattened_mut().iter_mut();
                 moved.zip(&*step).for_each(|(x, step)| *x += step);
-                let energy = self.differences(lengths, angles, trial, trial_differences);
+                let energy = self.differences(target, trial, trial_differences);
                 let gain = (found.energy - energy) / predicted;
                 let last = predicted <= UNTOLD * found.energy;
                 let taken = gain > GAIN || last && energy <= found.energy * (1.0 + UNTOLD);
@@ -253,31 +294,47 @@ impl Shell {
         Ok(found)
     }
 
-    /// Writes what lengths and angles in a frame are off the given ones; the sum of their squares.
-    fn differences(&self, lengths: &[f64], angles: &[f64], x: &[Point], out: &mut Vec<f64>) -> f64 {
+    /// Writes what a frame is off its target; E.
+    fn differences(&self, target: &Target, x: &[Point], out: &mut Vec<f64>) -> f64 {
         let length = |edge: &Edge| {
             let [a, b] = edge.ends.map(|v| x[v as usize]);
             norm(sub(b, a))
         };
-        let edges = self.edges.iter().zip(lengths);
-        let bends = self.bends.iter().zip(angles);
+        let edges = self.edges.iter().zip(target.lengths);
+        let bends = self.bends.iter().zip(target.angles);
+        let triangles = self.triangles.iter().zip(target.areas);
         out.clear();
         out.extend(edges.map(|(edge, given)| length(edge) - given));
         out.extend(bends.map(|(bend, given)| {
             let gap = dihedral_angle(bend.corners.map(|v| x[v as usize])) - given;
             gap - TAU * (gap / TAU).round()
         }));
+        out.extend(triangles.map(|(triangle, &least)| {
+            let [a, b, c] = triangle.corners.map(|v| x[v as usize]);
+            let area = 0.5 * norm(cross(sub(b, a), sub(c, a)));
+            if area < least {
+                (least / area).ln()
+            } else {
+                0.0
+            }
+        }));
         product(out, out)
     }
 
     fn assemble(&self, x: &[Point], differences: &[f64], second: Second, system: &mut System) {
         system.clear(self.vertices, self.couplings.len());
-        let (of_edges, of_bends) = differences.split_at(self.edges.len());
+        let (of_edges, others) = differences.split_at(self.edges.len());
+        let (of_bends, of_triangles) = others.split_at(self.bends.len());
         for (edge, &r) in self.edges.iter().zip(of_edges) {
             system.add_edge(edge, x, r, second);
         }
         for (bend, &r) in self.bends.iter().zip(of_bends) {
             system.add_bend(bend, x, r, second);
+        }
+        for (triangle, &r) in self.triangles.iter().zip(of_triangles) {
+            if r > 0.0 {
+                system.add_triangle(triangle, x, r, second);
+            }
         }
     }
 
@@ -291,8 +348,15 @@ impl Shell {
     ) -> Result<(), FactorError> {
         let (diagonal, others) = system.blocks.split_at(self.vertices);
         values.clear();
-        values.extend(diagonal.iter().flat_map(|block| {
-            LOWER.map(|[r, c]| block[r][c] + if r == c { damping } else { 0.0 })
+        let both = diagonal.iter().zip(&system.squares);
+        values.extend(both.flat_map(|(block, squares)| {
+            LOWER.map(|[r, c]| {
+                block[r][c]
+                    + match r == c {
+                        true => damping * weight(squares[r]),
+                        false => 0.0,
+                    }
+            })
         }));
         values.extend(others.iter().flat_map(|block| block.as_flattened()));
         match factor {
@@ -310,6 +374,11 @@ impl Shell {
 
 /// Rows and columns of the lower triangle of a block.
 const LOWER: [[usize; 2]; 6] = [[0, 0], [1, 0], [1, 1], [2, 0], [2, 1], [2, 2]];
+
+/// How much damping holds a coordinate beside another: as much as E does (Marquardt 1963), and a little where E does not.
+fn weight(square: f64) -> f64 {
+    square + LEAST_WEIGHT
+}
 
 impl System {
     fn clear(&mut self, vertices: usize, couplings: usize) {
@@ -409,6 +478,66 @@ impl System {
                     add(&mut self.blocks[a], &block(q, p), 1.0);
                 }
             }
+        }
+    }
+
+    /// r = ln A - ln area, area = |N| / 2, N = e x p with e = j - i and p = k - i, and n its direction: r' = -n . N' / |N|, and
+    /// r'' = -(N'^T (1 - 2 n n^T) N' / |N|^2 + n . N'' / |N|).
+    fn add_triangle(&mut self, triangle: &Triangle, x: &[Point], r: f64, second: Second) {
+        let corners = triangle.corners.map(|v| v as usize);
+        let [i, j, k] = corners.map(|v| x[v]);
+        let (e, p) = (sub(j, i), sub(k, i));
+        let normal = cross(e, p);
+        let size = norm(normal);
+        let n = normal.map(|x| x / size);
+        let by_j = cross(p, n).map(|x| -x / size);
+        let by_k = cross(n, e).map(|x| -x / size);
+        let first = [[0, 1, 2].map(|i| -(by_j[i] + by_k[i])), by_j, by_k];
+        // Of N by each coordinate of i, j and k.
+        let turned: [[Point; 3]; 3] = std::array::from_fn(|corner| {
+            std::array::from_fn(|axis| {
+                let mut d = [0.0; 3];
+                d[axis] = 1.0;
+                match corner {
+                    0 => cross(d, sub(j, k)),
+                    1 => cross(d, p),
+                    _ => cross(e, d),
+                }
+            })
+        });
+        // n . N'' of two corners: N is the sum of i x j, j x k and k x i.
+        let skew: Block = [[0.0, n[2], -n[1]], [-n[2], 0.0, n[0]], [n[1], -n[0], 0.0]];
+        let block = |a: usize, b: usize| -> Block {
+            let sign = match (3 + b - a) % 3 {
+                0 => 0.0,
+                1 => 1.0,
+                _ => -1.0,
+            };
+            std::array::from_fn(|row| {
+                std::array::from_fn(|column| {
+                    let (u, v) = (turned[a][row], turned[b][column]);
+                    let bent = (dot(u, v) - 2.0 * dot(u, n) * dot(v, n)) / (size * size)
+                        + sign * skew[row][column] / size;
+                    let whole = match second {
+                        Second::Newton => -r * bent,
+                        Second::GaussNewton => 0.0,
+                    };
+                    first[a][row] * first[b][column] + whole
+                })
+            })
+        };
+        for (corner, &v) in corners.iter().enumerate() {
+            for axis in 0..3 {
+                self.gradient[v][axis] += r * first[corner][axis];
+                self.squares[v][axis] += first[corner][axis] * first[corner][axis];
+            }
+            add(&mut self.blocks[v], &block(corner, corner), 1.0);
+        }
+        let vertices = self.gradient.len();
+        for (&[a, b], &coupling) in SIDES.iter().zip(&triangle.couplings) {
+            let ascending = corners[a] < corners[b];
+            let block = if ascending { block(a, b) } else { block(b, a) };
+            add(&mut self.blocks[vertices + coupling as usize], &block, 1.0);
         }
     }
 }

@@ -12,6 +12,9 @@ use crate::arrays::{ArrayError, Bundle};
 /// Differences of so much, root mean square, are rounding and have no direction.
 const ROUNDING: f64 = 1e-10;
 
+/// The share of the area of the given lengths below which a triangle counts (PROTOCOL.md).
+const LEAST_AREA: f64 = 0.1;
+
 /// Where the numbers of a mesh are in z.
 struct Layout {
     /// Edges with the place of their length.
@@ -47,6 +50,13 @@ impl Layout {
             .iter()
             .map(|(ends, _)| chord(reference, *ends).norm());
         lengths.sum::<f64>() / self.lengths.len() as f64
+    }
+
+    /// The place of the length of an edge.
+    fn place(&self, a: u32, b: u32) -> usize {
+        let edge = [a.min(b), a.max(b)];
+        let found = self.lengths.binary_search_by_key(&edge, |(edge, _)| *edge);
+        found.map_or(usize::MAX, |at| self.lengths[at].1)
     }
 
     fn sound_pairs<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = &'a PairPlace> {
@@ -101,6 +111,12 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
         ("angles", angles),
         ("placement", placed),
     ])
+}
+
+/// The area of a triangle with these sides, 0 where they make none.
+fn heron([a, b, c]: [f64; 3]) -> f64 {
+    let s = 0.5 * (a + b + c);
+    (s * (s - a) * (s - b) * (s - c)).max(0.0).sqrt()
 }
 
 fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
@@ -216,6 +232,22 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
                 (j, up * f.3 + down * g.3),
             ],
         );
+    }
+    for face in mesh.faces.iter().filter(|face| mesh.is_sound(face)) {
+        let [a, b, c] = *face;
+        let side = |a: u32, b: u32| z[layout.place(a, b)];
+        let least = LEAST_AREA * heron([side(a, b), side(b, c), side(c, a)]);
+        let [e, p] = edges(frame, face).map(|e| e / unit);
+        let normal = e.cross(&p);
+        let area = 0.5 * normal.norm();
+        if area < least {
+            // The area grows where a corner moves away from the side across.
+            let away = |side: Vector3<f64>| normal.normalize().cross(&side) / (2.0 * area);
+            add(
+                (least / area).ln(),
+                &[(a, -away(p - e)), (b, -away(-p)), (c, -away(e))],
+            );
+        }
     }
     let rms = (energy / f64::max(count, 1.0)).sqrt();
     if rms <= ROUNDING {
