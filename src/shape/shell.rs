@@ -552,3 +552,106 @@ fn add(sum: &mut Block, block: &Block, factor: f64) {
     sum.zip(block.as_flattened())
         .for_each(|(sum, x)| *sum += factor * x);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Two triangles at an edge and a third at both: three hinges, and one whose triangles have the same corners.
+    const FACES: [[u32; 3]; 4] = [[0, 1, 2], [1, 0, 3], [2, 1, 3], [0, 2, 1]];
+    const EDGES: [[u32; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    const HINGES: [[u32; 4]; 4] = [[0, 1, 2, 3], [1, 2, 0, 3], [1, 3, 0, 2], [0, 1, 2, 2]];
+
+    /// E of these vertices, and half its derivatives.
+    fn energy(shell: &Shell, target: &Target, x: &[Point]) -> (f64, System) {
+        let (mut differences, mut system) = (Vec::new(), System::default());
+        let energy = shell.differences(target, x, &mut differences);
+        shell.assemble(x, &differences, Second::Newton, &mut system);
+        (energy, system)
+    }
+
+    /// Row `i`, column `j` of the second derivatives.
+    fn second(shell: &Shell, system: &System, i: usize, j: usize) -> f64 {
+        let [v, w] = [i, j].map(|i| (i / 3) as u32);
+        if v == w {
+            return system.blocks[v as usize][i % 3][j % 3];
+        }
+        let coupling = shell
+            .couplings
+            .binary_search(&[v.min(w), v.max(w)])
+            .unwrap();
+        let block = &system.blocks[shell.vertices + coupling];
+        if v < w {
+            block[i % 3][j % 3]
+        } else {
+            block[j % 3][i % 3]
+        }
+    }
+
+    fn areas(x: &[Point]) -> [f64; 4] {
+        FACES.map(|f| {
+            let [a, b, c] = f.map(|v| x[v as usize]);
+            0.5 * norm(cross(sub(b, a), sub(c, a)))
+        })
+    }
+
+    proptest! {
+        /// Against central differences, with two triangles smaller than they should be.
+        #[test]
+        fn derivatives(x in prop::array::uniform4(prop::array::uniform3(-1.0f64..1.0))) {
+            let found = areas(&x);
+            prop_assume!(found.iter().all(|a| *a > 0.15));
+            let least = [1.7 * found[0], 0.3 * found[1], 2.5 * found[2], 0.0];
+            let target = Target { lengths: &[0.7; 6], angles: &[0.4; 4], areas: &least };
+            let shell = Shell::new(4, &EDGES, &HINGES, &FACES).unwrap();
+            // The last hinge is folded back on itself: its angle is pi or -pi.
+            let shell = Shell { bends: shell.bends[..3].to_vec(), ..shell };
+            let (_, system) = energy(&shell, &target, &x);
+            const STEP: f64 = 1e-5;
+            for i in 0..12 {
+                let [(after, next), (before, last)] = [STEP, -STEP].map(|by| {
+                    let mut moved = x;
+                    moved[i / 3][i % 3] += by;
+                    energy(&shell, &target, &moved)
+                });
+                let slope = (after - before) / (4.0 * STEP);
+                let found = system.gradient[i / 3][i % 3];
+                prop_assert!((slope - found).abs() < 1e-5 * (1.0 + slope.abs()), "{i}: {slope} {found}");
+                for j in 0..12 {
+                    let slope = (next.gradient[j / 3][j % 3] - last.gradient[j / 3][j % 3]) / (2.0 * STEP);
+                    let found = second(&shell, &system, j, i);
+                    prop_assert!((slope - found).abs() < 1e-3 * (1.0 + slope.abs()), "{i} {j}: {slope} {found}");
+                }
+            }
+        }
+
+        /// Lengths and angles of a surface are met; others lead to a frame where E is stationary, and no triangle is flat there.
+        #[test]
+        fn descents_end_where_they_say(
+            x in prop::array::uniform4(prop::array::uniform3(-1.0f64..1.0)), by in prop::collection::vec(0.6f64..1.6, 9),
+        ) {
+            let most = areas(&x);
+            prop_assume!(most.iter().all(|a| *a > 0.15));
+            let shell = Shell::new(4, &EDGES, &HINGES[..3], &FACES).unwrap();
+            let mut here = Vec::new();
+            let none = Target { lengths: &[0.0; 6], angles: &[0.0; 3], areas: &[0.0; 4] };
+            shell.differences(&none, &x, &mut here);
+            let exact = Target { lengths: &here[..6], angles: &here[6..9], areas: &[0.0; 4] };
+            let mut start = x;
+            let met = shell.descend(&exact, &mut start).unwrap();
+            prop_assert!(met.factorisations == 0 && met.imbalance == 0.0 && start == x);
+            let other: Vec<f64> = here.iter().zip(&by).map(|(x, by)| x * by).collect();
+            let least = most.map(|a| 0.1 * a);
+            let target = Target { lengths: &other[..6], angles: &other[6..], areas: &least };
+            let (before, _) = energy(&shell, &target, &x);
+            let found = shell.descend(&target, &mut start).unwrap();
+            let (after, system) = energy(&shell, &target, &start);
+            prop_assert!(after <= before && (after - found.energy).abs() <= 1e-12 * before);
+            prop_assert!(areas(&start).iter().all(|a| *a > 0.0));
+            if found.is_stationary() && found.energy > 1e-20 {
+                prop_assert!(system.imbalance(after) <= 1e-5, "{found:?} {}", system.imbalance(after));
+            }
+        }
+    }
+}
