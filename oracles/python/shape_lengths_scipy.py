@@ -22,7 +22,7 @@ DAMPING = 1e-6
 DIRECTIONS = 100  # of conjugate gradients, in a step
 STALE = 12  # directions in a step that call for a new preconditioner
 LOG = 0
-FLAT = 1e-3  # part of its height in the reference
+FLAT = 1e-6  # a triangle without height, in parts of the reference's: angles jump there, and the descent ends
 
 
 class Residual:
@@ -118,8 +118,11 @@ class Point:
     def preconditioner(self):
         return spd_factor((self.J.T @ self.J + DAMPING * sparse.eye(len(self.g))).tocsc(), "NATURAL")
 
-    def hessian(self, d):
-        """Times d: the derivative of J by central differences that change no triangle by more than 1e-5 of its height."""
+    def hessian(self, d, curved):
+        """Times d. Gauss-Newton's J^T J, or where `curved` with the derivative of J by central differences that change no triangle by more than 1e-5 of
+        its height."""
+        if not curved:
+            return self.J.T @ (self.J @ d)
         v = self.residual.vectors(d)
         mesh = self.residual.lengths.mesh
         change = norms(v[mesh.F[mesh.solid]]).max(axis=1) / self.residual.heights(self.y)
@@ -133,7 +136,7 @@ class Point:
         return decrease if abs(decrease) > SUM_DIGITS * (self.r @ self.r) else -(self.g + other.g) @ d / 2
 
 
-def trust_region_step(point, factor, radius, tolerance):
+def trust_region_step(point, curved, factor, radius, tolerance):
     """The step d, its length in the preconditioner's norm, the decrease that it promises, and the number of directions (Conn, Gould & Toint, 7.5.1)."""
     d, Hd, left = np.zeros((3, len(point.g)))
     left = left + point.g
@@ -141,7 +144,7 @@ def trust_region_step(point, factor, radius, tolerance):
     size = first = left @ v
     p, dd, dp, pp = -v, 0.0, 0.0, size
     for count in range(1, DIRECTIONS + 1):
-        Hp = point.hessian(p)
+        Hp = point.hessian(p, curved)
         curvature = p @ Hp
         step = size / curvature if curvature > 0 else np.inf
         outside = curvature <= 0 or dd + step * (2 * dp + step * pp) >= radius**2
@@ -165,14 +168,14 @@ def stationary(residual, y, given):
     found = residual(y, given)
     if found is None:
         raise ArithmeticError("the linear start has a triangle without height")
-    point, factor, radius = Point(residual, y, given, found), None, None
+    point, curved, factor, radius = Point(residual, y, given, found), False, None, None
     for step in range(STEPS):
         if point.exact():
             return point.y
         if factor is None:
             factor = point.preconditioner()
             radius = radius or np.sqrt(point.g @ factor.solve(point.g))  # at first the length of Gauss-Newton's step
-        d, length, promised, count = trust_region_step(point, factor, radius, min(0.1, np.sqrt(point.cosine)))
+        d, length, promised, count = trust_region_step(point, curved, factor, radius, np.clip(np.sqrt(point.cosine), 0.01, 0.1))
         trial = point.moved(d)
         gain = -1.0 if trial is None else point.decrease(trial, d) / promised
         if LOG: print(step, 'E %.6e cos %.1e g %.1e gain %.3f len %.1e rad %.1e cg %d height %.1e'%(point.r@point.r/2, point.cosine, abs(point.g).max(), gain, length, radius, count, (residual.heights(point.y)/residual.reference_heights).min()))
@@ -182,13 +185,15 @@ def stationary(residual, y, given):
             radius = length / 4
         elif gain > 0.75:
             radius = max(radius, 2 * length)
+        curved = curved or trial is None or trial.r @ trial.r > 0.9 * (point.r @ point.r)
         if gain > 0:
             point, factor = trial, factor if count <= STALE else None
+            flattest = np.min(residual.heights(point.y) / residual.reference_heights)
+            if flattest <= FLAT:
+                raise ArithmeticError(f"no stationary frame: after {step + 1} steps a triangle has {flattest:.1e} of its height in the reference")
         elif np.abs(d).max() <= np.finfo(float).eps * np.abs(point.y).max():
             break
-    flattest = np.min(residual.heights(point.y) / residual.reference_heights)
-    where = f"cosine {point.cosine:.1e} after {step + 1} steps, the flattest triangle at {flattest:.1e} of its height in the reference"
-    raise ArithmeticError(f"{'the descent ends at a triangle without height' if flattest <= FLAT else 'no stationary frame'}: {where}")
+    raise ArithmeticError(f"no descent, cosine {point.cosine:.1e} after {step + 1} steps")
 
 
 class Decoder:
