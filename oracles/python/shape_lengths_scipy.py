@@ -19,10 +19,10 @@ EXACT = 1e-12  # root mean square of the residuals, in mean edge lengths and rad
 STATIONARY = 1e-7  # cosine of the angle between the residuals and a column of the Jacobian, where no step halves it any more
 SUM_DIGITS = 1e-9  # below this part of the sum of squares, a decrease is told by the gradients at both ends
 DAMPING = 1e-6
+SLOW = 0.9  # a step that leaves more of the sum calls for second derivatives
 DIRECTIONS = 100  # of conjugate gradients, in a step
 STALE = 12  # directions in a step that call for a new preconditioner
-LOG = 0
-FLAT = 1e-6  # a triangle without height, in parts of the reference's: angles jump there, and the descent ends
+FLAT = 1e-5  # a triangle without height, in parts of the reference's: angles jump there, and the descent ends
 
 
 class Residual:
@@ -110,6 +110,10 @@ class Point:
     def exact(self):
         return self.r @ self.r <= EXACT**2 * len(self.r)
 
+    def flattest(self):
+        """The least height of a triangle, in parts of the reference's."""
+        return np.min(self.residual.heights(self.y) / self.residual.reference_heights, initial=np.inf)
+
     def moved(self, d):
         y = self.y + self.residual.vectors(d)
         found = self.residual(y, self.given)
@@ -170,7 +174,7 @@ def stationary(residual, y, given):
         raise ArithmeticError("the linear start has a triangle without height")
     point, curved, factor, radius = Point(residual, y, given, found), False, None, None
     for step in range(STEPS):
-        if point.exact():
+        if point.exact() or point.cosine == 0:
             return point.y
         if factor is None:
             factor = point.preconditioner()
@@ -178,22 +182,22 @@ def stationary(residual, y, given):
         d, length, promised, count = trust_region_step(point, curved, factor, radius, np.clip(np.sqrt(point.cosine), 0.01, 0.1))
         trial = point.moved(d)
         gain = -1.0 if trial is None else point.decrease(trial, d) / promised
-        if LOG: print(step, 'E %.6e cos %.1e g %.1e gain %.3f len %.1e rad %.1e cg %d height %.1e'%(point.r@point.r/2, point.cosine, abs(point.g).max(), gain, length, radius, count, (residual.heights(point.y)/residual.reference_heights).min()))
         if point.cosine <= STATIONARY and (trial is None or trial.cosine > point.cosine / 2):
             return point.y
         if gain < 0.25:
             radius = length / 4
         elif gain > 0.75:
             radius = max(radius, 2 * length)
-        curved = curved or trial is None or trial.r @ trial.r > 0.9 * (point.r @ point.r)
+        curved = curved or trial is None or trial.r @ trial.r > SLOW * (point.r @ point.r)
         if gain > 0:
             point, factor = trial, factor if count <= STALE else None
-            flattest = np.min(residual.heights(point.y) / residual.reference_heights)
-            if flattest <= FLAT:
-                raise ArithmeticError(f"no stationary frame: after {step + 1} steps a triangle has {flattest:.1e} of its height in the reference")
+            if point.flattest() <= FLAT:
+                break
         elif np.abs(d).max() <= np.finfo(float).eps * np.abs(point.y).max():
             break
-    raise ArithmeticError(f"no descent, cosine {point.cosine:.1e} after {step + 1} steps")
+    flattest = point.flattest()
+    reason = "the descent ends at a triangle without height" if flattest <= FLAT else "no step descends"
+    raise ArithmeticError(f"{reason}: cosine {point.cosine:.1e} after {step + 1} steps, the flattest at {flattest:.1e} of its height in the reference")
 
 
 class Decoder:
