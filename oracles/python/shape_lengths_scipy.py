@@ -196,7 +196,7 @@ def stationary(residual, y, given):
         elif np.abs(d).max() <= np.finfo(float).eps * np.abs(point.y).max():
             break
     flattest = point.flattest()
-    reason = "the descent ends at a triangle without height" if flattest <= FLAT else "no step descends"
+    reason = "the descent ends at a triangle without height" if flattest <= FLAT else "no stationary frame is reached"
     raise ArithmeticError(f"{reason}: cosine {point.cosine:.1e} after {step + 1} steps, the flattest at {flattest:.1e} of its height in the reference")
 
 

@@ -319,9 +319,8 @@ def test_lengths_means():
             moved = x + 1e-3 * squeeze * np.sin(np.arange(x.size)).reshape(x.shape)
             check(f"shape_lengths_scipy: a frame beside it is not stationary{name}", cosines(encoder, inputs, z, moved, h)[0].max() > 1e3 * near)
 
-        flat, F = fold(0)
-        z = encoder.run(reference=flat, F=F, frames=fold(0.8)[0][None])["z"]
-        z[0, 0] *= 3  # the spine is longer than the two other sides of either page
+        flat, F = sheet(4, 0.0, 1e-4)
+        z = encoder.run(reference=flat, F=F, frames=np.array([sheet(4, 0.2, 1e-4)[0], across(4, 0.2, 1e-4)]))["z"].mean(axis=0, keepdims=True)
         reply = decoder.request(reference=flat, F=F, z=z)
         check("shape_lengths_scipy: a triangle without height is an error", reply["status"] == "error" and "without height" in reply["message"])
 
