@@ -1,7 +1,7 @@
 """shape.lengths_decode with scipy.sparse: a trust region by conjugate gradients (Steihaug 1983) on the lengths, the dihedral angles and the terms of
-triangles below a tenth of their areas, with an analytic Jacobian J. The second derivatives are J^T J and differences of J along each direction, for Gauss-Newton's part alone creeps on vectors of no frame;
-J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of shape_lric_numpy.py with the stretches that the lengths give: where z
-is that of a frame, it starts at the answer.
+triangles below a tenth of their areas, with an analytic Jacobian J. The second derivatives are J^T J and differences of J along each direction, for
+Gauss-Newton's part alone creeps on vectors of no frame; J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of
+shape_lric_numpy.py with the stretches that the lengths give: where z is that of a frame, it starts at the answer.
 
 `seconds` is everything that depends on z. The preconditioner's damping never moves the minimum, and settles the motions that z leaves free, which the six
 numbers fix.
