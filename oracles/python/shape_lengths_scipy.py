@@ -1,7 +1,7 @@
-"""shape.lengths_decode with scipy.sparse: a trust region by conjugate gradients (Steihaug 1983) on the lengths and dihedral angles, with an analytic
-Jacobian J. The second derivatives are J^T J and differences of J along each direction, for Gauss-Newton's part alone creeps on vectors of no frame;
-J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of shape_lric_numpy.py with the stretches that the lengths give: where z
-is that of a frame, it starts at the answer.
+"""shape.lengths_decode with scipy.sparse: a trust region by conjugate gradients (Steihaug 1983) on the lengths, the dihedral angles and the terms of
+triangles below a tenth of their areas, with an analytic Jacobian J. The second derivatives are J^T J and differences of J along each direction, for
+Gauss-Newton's part alone creeps on vectors of no frame; J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of
+shape_lric_numpy.py with the stretches that the lengths give: where z is that of a frame, it starts at the answer.
 
 `seconds` is everything that depends on z. The preconditioner's damping never moves the minimum, and settles the motions that z leaves free, which the six
 numbers fix.
@@ -22,11 +22,13 @@ DAMPING = 1e-6
 SLOW = 0.9  # a step that leaves more of the sum calls for second derivatives
 DIRECTIONS = 100  # of conjugate gradients, in a step
 STALE = 12  # directions in a step that call for a new preconditioner
+LEAST_AREA = 0.1  # of a triangle, in parts of the area that its given lengths make
 FLAT = 1e-5  # a triangle without height, in parts of the reference's: angles jump there, and the descent ends
 
 
 class Residual:
-    """Of all numbers of the edges, for coordinates y in mean edge lengths; column i of `given` order: lengths, then angles of solid pairs."""
+    """Of all numbers of the edges, and of the areas, for coordinates y in mean edge lengths; in the order of `given`: lengths, then angles of solid
+    pairs, then logarithms of the least areas of solid triangles, -inf where there is none."""
 
     def __init__(self, lengths):
         self.lengths, edges, mesh = lengths, lengths.edges, lengths.mesh
@@ -37,17 +39,19 @@ class Residual:
         self.o_f, self.o_g = opposite[edges.half_f[pairs]], opposite[edges.half_g[pairs]]
         self.turned = np.where(edges.alike[pairs], -1.0, 1.0)[:, None]
         stencil = np.column_stack([self.s, self.e, self.o_f, self.o_g])
-        E, P = len(self.i), len(self.s)
-        vertices = np.concatenate([np.column_stack([self.i, self.j]).ravel(), stencil.ravel()])
-        width = np.repeat([2, 4], [E, P])
-        rows = np.repeat(np.arange(E + P), width)
+        corners = mesh.F[mesh.solid]
+        counts = E, P, A = len(self.i), len(self.s), len(corners)
+        vertices = np.concatenate([np.column_stack([self.i, self.j]).ravel(), stencil.ravel(), corners.ravel()])
+        width = np.repeat([2, 4, 3], counts)
+        rows = np.repeat(np.arange(E + P + A), width)
 
-        graph = sparse.csr_matrix((np.ones(len(rows)), (rows, vertices)), (E + P, mesh.V))
+        graph = sparse.csr_matrix((np.ones(len(rows)), (rows, vertices)), (E + P + A, mesh.V))
         order = np.argsort(spd_factor((graph.T @ graph + 100 * E * sparse.eye(mesh.V)).tocsc()).perm_c)
         self.order = (3 * order[:, None] + np.arange(3)).ravel()
         columns = 3 * np.argsort(order)[vertices][:, None] + np.arange(3)
         self.pattern = columns.ravel(), np.concatenate([[0], np.cumsum(3 * width)])
-        self.shape = (E + P, 3 * mesh.V)
+        self.shape = (E + P + A, 3 * mesh.V)
+        self.areas = slice(E + P, None)
         self.reference_heights = self.heights(mesh.reference / lengths.unit)
 
     def vectors(self, d):
@@ -61,12 +65,23 @@ class Residual:
         e1, e2, normal = corners_to_edges(y, self.lengths.mesh.F[self.lengths.mesh.solid])
         return norms(normal) / np.maximum(np.maximum(norms(e1), norms(e2)), norms(e2 - e1))
 
-    def __call__(self, y, given):
-        """The residuals and their Jacobian (columns in `order`), or None where a triangle has collapsed."""
+    def given(self, l, angles):
+        """The numbers given: l (E), of any sign, and the angles of all pairs."""
+        longest, middle, shortest = np.sort(np.maximum(l, 0)[self.lengths.edges.edge.reshape(-1, 3)[self.lengths.mesh.solid]]).T[::-1]
+        excess = shortest - (longest - middle)
+        made = excess > 0
+        factors = np.stack([longest + (middle + shortest), excess, shortest + (longest - middle), longest + (middle - shortest)])  # Kahan's, of Heron
+        logs = np.log(np.where(made, factors, 1)).sum(axis=0) / 2 - np.log(4)
+        return np.concatenate([l, angles[self.lengths.edges.solid], np.where(made, np.log(LEAST_AREA) + logs, -np.inf)])
+
+    def __call__(self, y, given, active=None):
+        """The residuals and their Jacobian (columns in `order`), or None where a triangle has collapsed. The triangles of which the Jacobian has rows other
+        than zero are `active`, else those below their least areas."""
         mesh, edges = self.lengths.mesh, self.lengths.edges
         try:
             normals = np.zeros((len(mesh.F), 3))
-            normals[mesh.solid] = solid_triangles(mesh, y)[2]
+            e1, e2, solid_normals = solid_triangles(mesh, y)
+            normals[mesh.solid] = solid_normals
         except Unsupported:
             return None
         chord = y[self.j] - y[self.i]
@@ -90,10 +105,16 @@ class Residual:
         angles = np.arctan2(sine, np.einsum("pi,pi->p", n[0], n[1]))
         by_angle = np.stack([parts[0][0] + parts[1][0], parts[0][1] + parts[1][1], parts[0][2], parts[1][2]], axis=1)
 
-        r = np.concatenate([length, angles]) - given
-        bends = r[len(length) :]
+        twice = norms(solid_normals)
+        small = np.maximum(given[self.areas] - np.log(twice / 2), 0)
+        across = np.stack([e1 - e2, e2, -e1], axis=1)  # from the corner before to the corner after, in the triangle's plane
+        by_area = np.cross(solid_normals[:, None], across) / np.square(twice)[:, None, None]
+        by_area[~(small > 0 if active is None else active)] = 0
+
+        bends = angles - given[len(length) : self.areas.start]
         bends -= 2 * np.pi * np.round(bends / (2 * np.pi))
-        values = np.concatenate([direction.ravel(), by_angle.ravel()])
+        r = np.concatenate([length - given[: len(length)], bends, small])
+        values = np.concatenate([direction.ravel(), by_angle.ravel(), by_area.ravel()])
         return r, sparse.csr_matrix((values, *self.pattern), self.shape)
 
 
@@ -131,7 +152,8 @@ class Point:
         mesh = self.residual.lengths.mesh
         change = norms(v[mesh.F[mesh.solid]]).max(axis=1) / self.residual.heights(self.y)
         h = 1e-5 / change.max(initial=1e-300)
-        (_, ahead), (_, behind) = (self.residual(self.y + sign * h * v, self.given) for sign in (1, -1))
+        active = self.r[self.residual.areas] > 0
+        (_, ahead), (_, behind) = (self.residual(self.y + sign * h * v, self.given, active) for sign in (1, -1))
         return self.J.T @ (self.J @ d) + (ahead.T @ self.r - behind.T @ self.r) / (2 * h)
 
     def decrease(self, other, d):
@@ -221,8 +243,7 @@ class Decoder:
         lengths, mesh, lric = self.lengths, self.mesh, self.lric
         l, angles, six = z[lengths.length_slot], z[lengths.pair_slot], z[lengths.size :].reshape(-1, 6)
         x = self.start(self.stretches(l * lengths.unit), angles, six)
-        given = np.concatenate([l, angles[lengths.edges.solid]])
-        x = lengths.unit * stationary(self.residual, x / lengths.unit, given)
+        x = lengths.unit * stationary(self.residual, x / lengths.unit, self.residual.given(l, angles))
         turned = lric.triangle_frames(x)[1][lric.roots]
         turn = np.tile(np.eye(3), (mesh.C, 1, 1))
         turn[lric.rooted] = exp_rotation(six[lric.rooted, :3]) @ lric.B0[lric.roots] @ turned.transpose(0, 2, 1)
