@@ -16,6 +16,8 @@ const DEFLATE_LIMIT: u64 = 1032;
 /// Above this unpacked size, arrays must not be packed better than `PLAUSIBLE_RATIO`: positions never are.
 const LARGE: u64 = 1 << 30;
 const PLAUSIBLE_RATIO: u64 = 100;
+/// More names than these are not listed.
+const MOST_NAMES: usize = 20;
 
 /// An open NPZ file, whose directory has been read and whose arrays are read on demand.
 ///
@@ -89,9 +91,13 @@ impl Archive {
 
     fn entry(&self, array: &str) -> Result<&Entry, NpzProblem> {
         let found = self.entries.iter().find(|e| e.name == array);
-        found.ok_or_else(|| NpzProblem::Missing {
-            array: array.to_string(),
-            found: self.names().map(str::to_string).collect(),
+        found.ok_or_else(|| {
+            let mut found: Vec<_> = self.names().map(str::to_string).take(MOST_NAMES).collect();
+            if self.entries.len() > MOST_NAMES {
+                found.push("and more".into());
+            }
+            let array = array.to_string();
+            NpzProblem::Missing { array, found }
         })
     }
 
