@@ -369,11 +369,7 @@ fn refine_numbers(told: &Refinement) -> serde_json::Value {
 }
 
 /// Everything that `--json` holds.
-fn numbers(
-    sequence: &Sequence,
-    found: &SpaceFit,
-    how: How,
-) -> serde_json::Value {
+fn numbers(sequence: &Sequence, found: &SpaceFit, how: How) -> serde_json::Value {
     let fit = &found.fit;
     let (k, l, m) = fit.klm();
     let (n, vertices) = (

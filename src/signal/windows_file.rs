@@ -45,7 +45,9 @@ impl WindowsWriter {
     ) -> Result<Self, RepresentationError> {
         let mut out = Writer::create(path)?;
         let ranges = plan.windows().iter();
-        let ranges = ranges.flat_map(|w| [w.start as i64, w.end as i64]).collect();
+        let ranges = ranges
+            .flat_map(|w| [w.start as i64, w.end as i64])
+            .collect();
         let windows = Array::I64 {
             shape: vec![plan.windows().len(), 2],
             data: ranges,
@@ -308,7 +310,9 @@ fn head(archive: &mut Archive, place: &str) -> Result<(Plan, SpaceKind, Bundle),
     let space = space_of(bundle.text("meta").map_err(arrays)?, FORMAT);
     let space = space.map_err(|what| inconsistent(place, what))?;
     if space != SpaceKind::Vertex {
-        let reference = archive.read("reference").map_err(RepresentationError::from)?;
+        let reference = archive
+            .read("reference")
+            .map_err(RepresentationError::from)?;
         bundle.put("reference", reference);
     }
     let ranges = ranges(&bundle).map_err(arrays)?;
@@ -327,9 +331,13 @@ fn ranges(bundle: &Bundle) -> Result<Vec<std::ops::Range<usize>>, ArrayError> {
         found: found.describe(),
     };
     match bundle.get("windows")? {
-        Array::I64 { shape, data } if matches!(shape[..], [_, 2]) && data.iter().all(|&x| x >= 0) => {
+        Array::I64 { shape, data }
+            if matches!(shape[..], [_, 2]) && data.iter().all(|&x| x >= 0) =>
+        {
             let pairs = data.chunks_exact(2);
-            Ok(pairs.map(|pair| pair[0] as usize..pair[1] as usize).collect())
+            Ok(pairs
+                .map(|pair| pair[0] as usize..pair[1] as usize)
+                .collect())
         }
         other => Err(wrong(other)),
     }

@@ -43,11 +43,7 @@ impl InfoVerb {
                 "frames {first} to {last}: k = {k}, l = {l}, m = {m}, {stored} numbers"
             ));
         }
-        let (n, vertices, faces) = (
-            plan.frame_count(),
-            mesh.vertex_count(),
-            mesh.faces().len(),
-        );
+        let (n, vertices, faces) = (plan.frame_count(), mesh.vertex_count(), mesh.faces().len());
         let numbers = json!({
             "n": n, "V": vertices, "F": faces, "space": file.space().name(),
             "overlap": plan.overlap(), "windows": windows, "stored_numbers": stored_numbers,

@@ -57,7 +57,8 @@ pub fn run(verb: &FitVerb, window: usize, how: How) -> Outcome {
     };
     let named = |frames: &Sequence, j: usize| {
         let (from, to) = (plan.windows()[j].start + 1, plan.windows()[j].end);
-        fit_window(frames, j).map_err(|e| format!("window {}, frames {from} to {to}: {e}", j + 1).into())
+        fit_window(frames, j)
+            .map_err(|e| format!("window {}, frames {from} to {to}: {e}", j + 1).into())
     };
     let keep = |stored: &Stored| -> Result<(), Failure> {
         Ok(writer.as_mut().map_or(Ok(()), |w| w.add(stored))?)
@@ -123,7 +124,9 @@ fn numbers(
 fn describe(name: &str, v: &Value) -> String {
     let number = |v: &Value, key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let windows = v["windows"].as_array().map_or(&[][..], Vec::as_slice);
-    let astray = windows.iter().map(|w| w["astray"].as_array().map_or(0, Vec::len));
+    let astray = windows
+        .iter()
+        .map(|w| w["astray"].as_array().map_or(0, Vec::len));
     let mut text = format!(
         "{name}: {} space, n = {} in {} windows with {} frames in common, {} knots, {} layout\n\
          joined: squared distances of vertices {:.5}, relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\

@@ -26,9 +26,9 @@ use super::stream::FrameStream;
 pub use error::FormatError;
 pub use files::frame_files;
 use files::has_extension;
-pub use writer::FrameWriter;
 pub use natural::compare as natural_order;
 pub use obj::ObjProblem;
+pub use writer::FrameWriter;
 
 /// Reads the sequence at `path`; see the table above and [`frame_files`].
 ///

@@ -187,7 +187,10 @@ mod tests {
             assert!(writer.push(sequence.frame(0)).is_err());
             writer.finish().unwrap();
             if whole.is_file() {
-                assert_eq!(std::fs::read(&whole).unwrap(), std::fs::read(&parts).unwrap());
+                assert_eq!(
+                    std::fs::read(&whole).unwrap(),
+                    std::fs::read(&parts).unwrap()
+                );
             }
             let found = read(&parts).unwrap();
             assert_eq!(found.positions(), read(&whole).unwrap().positions());
@@ -202,7 +205,9 @@ mod tests {
         for name in ["a.npz", "a.pc2", "a"] {
             let path = folder.path().join(name);
             let mut writer = FrameWriter::create(&path, sequence.connectivity(), 3).unwrap();
-            writer.push(&sequence.positions()[..2 * sequence.dimension()]).unwrap();
+            writer
+                .push(&sequence.positions()[..2 * sequence.dimension()])
+                .unwrap();
             assert!(writer.push(&[0.0]).is_err());
             let mut bad = sequence.frame(2).to_vec();
             bad[4] = f64::NAN;

@@ -85,7 +85,8 @@ impl Puppet {
     pub(super) fn take(&self, pose: &Pose) -> Vec<Vector3<f64>> {
         let mut pose = pose.clone();
         pose.root.translation.vector *= self.size;
-        self.weights.skin(&self.skin.points, &self.body.place(&pose))
+        self.weights
+            .skin(&self.skin.points, &self.body.place(&pose))
     }
 }
 

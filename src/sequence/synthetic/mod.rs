@@ -586,7 +586,10 @@ mod tests {
             "@gallop?n=48",
         ] {
             let refused = stream_embedded(name).err().unwrap();
-            assert!(matches!(refused, SyntheticError::BadLength { .. }), "{name}");
+            assert!(
+                matches!(refused, SyntheticError::BadLength { .. }),
+                "{name}"
+            );
             assert_eq!(embedded(name).unwrap_err(), refused);
             assert!(refused.to_string().contains("one of @roam, @roam-small"));
         }

@@ -39,10 +39,7 @@ pub fn pose(at: f64) -> Pose {
         // Both are far less than a half turn from each other, so that there is a shortest arc.
         *turn = turn.slerp(to, share);
     }
-    let (from, to) = (
-        pose.root.translation.vector,
-        other.root.translation.vector,
-    );
+    let (from, to) = (pose.root.translation.vector, other.root.translation.vector);
     let between = from.lerp(&to, share);
     pose.root = Isometry3::translation(between.x, between.y, between.z);
     pose

@@ -215,7 +215,10 @@ fn refuse_bomb(entry: &Entry) -> Result<(), NpzProblem> {
     }
 }
 
-fn read_array<F: Read + Seek>(contents: &mut Contents<F>, entry: &Entry) -> Result<Array, ZipError> {
+fn read_array<F: Read + Seek>(
+    contents: &mut Contents<F>,
+    entry: &Entry,
+) -> Result<Array, ZipError> {
     let (header, before) = read_header(contents, &entry.name)?;
     let count = element_count(&header, before, entry)?;
     let array = elements::read(contents, &header, count, &entry.name)?;

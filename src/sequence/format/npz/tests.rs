@@ -31,7 +31,9 @@ fn problem(bytes: &[u8]) -> NpzProblem {
 fn stored(contents: &[u8]) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut archive = zip_write::Archive::new(&mut bytes);
-    archive.begin("a.npy".into(), contents.len() as u64).unwrap();
+    archive
+        .begin("a.npy".into(), contents.len() as u64)
+        .unwrap();
     archive.part(contents).unwrap();
     archive.end().unwrap();
     archive.finish().unwrap();
