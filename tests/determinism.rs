@@ -53,8 +53,8 @@ fn fits_do_not_depend_on_threads() {
         "@jelly-small --tolerance 0.01",
         "@gallop-small --frames 1..20 --every 2 --k 12 --l 10 --m 9",
         "@jelly-small --k 20 --l 15 --m 9 --space patch",
-        "@roam-small?n=90 --k 20 --l 15 --m 9 --window 40 --overlap 9",
-        "@roam-small?n=90 --tolerance 0.01 --window 40",
+        "@roam-small:90 --k 20 --l 15 --m 9 --window 40 --overlap 9",
+        "@roam-small:90 --tolerance 0.01 --window 40",
         "@roam-small --k 14 --l 10 --m 6 --window 25 --space patch",
     ] {
         same_bytes("rep.npz", |out| {

@@ -26,14 +26,14 @@ fn the_tolerance_holds_over_the_whole_sequence() {
     let scratch = Scratch::new();
     let json = scratch.arg("told.json");
     for (name, choice) in [
-        ("@roam-small?n=120", "--window 50"),
+        ("@roam-small:120", "--window 50"),
         (
-            "@roam-small?n=120",
+            "@roam-small:120",
             "--window 50 --overlap 16 --layout mds --knots literal",
         ),
-        ("@roam-small?n=60", "--window 35 --refine"),
-        ("@roam-small?n=45", "--window 25 --space gradient"),
-        ("@roam-small?n=45", "--window 25 --space patch"),
+        ("@roam-small:60", "--window 35 --refine"),
+        ("@roam-small:45", "--window 25 --space gradient"),
+        ("@roam-small:45", "--window 25 --space patch"),
     ] {
         let fit = format!("signal fit {name} --tolerance 0.01 --json {json}");
         let joined = numbers(&scratch, &format!("{fit} {choice}"));
@@ -53,14 +53,14 @@ fn the_tolerance_holds_over_the_whole_sequence() {
 #[test]
 fn the_frames_matter_and_not_where_they_are_read_from() {
     let scratch = Scratch::new();
-    let sequence = open("@roam-small?n=60").unwrap();
+    let sequence = open("@roam-small:60").unwrap();
     let choice = "--k 20 --l 15 --m 8 --window 24 --overlap 5";
     let fitted = |source: &str| {
         let rep = scratch.arg("rep.npz");
         must(&words(&format!("signal fit {source} {choice} -o {rep}")));
         fs::read(scratch.at("rep.npz")).unwrap()
     };
-    let expected = fitted("@roam-small?n=60");
+    let expected = fitted("@roam-small:60");
     for name in ["all.npz", "all"] {
         write(&sequence, &scratch.at(name)).unwrap();
         assert!(fitted(&scratch.arg(name)) == expected, "{name}");
@@ -69,12 +69,12 @@ fn the_frames_matter_and_not_where_they_are_read_from() {
     let rounded = read(&scratch.at("all.pc2")).unwrap();
     write(&rounded, &scratch.at("rounded.npz")).unwrap();
     assert!(fitted(&scratch.arg("all.pc2")) == fitted(&scratch.arg("rounded.npz")));
-    let longer = "@roam-small?n=70 --frames ..60";
+    let longer = "@roam-small:70 --frames ..60";
     assert!(fitted(longer) == expected);
     let indices: Vec<usize> = (4..60).step_by(2).collect();
     let some = sequence.select(&indices).unwrap();
     write(&some, &scratch.at("some.npz")).unwrap();
-    assert!(fitted("@roam-small?n=60 --frames 5.. --every 2") == fitted(&scratch.arg("some.npz")));
+    assert!(fitted("@roam-small:60 --frames 5.. --every 2") == fitted(&scratch.arg("some.npz")));
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn one_window_samples_as_the_plain_fit_does() {
 fn samples_come_in_every_format_and_order_and_info_tells_of_windows() {
     let scratch = Scratch::new();
     let rep = scratch.arg("rep.npz");
-    let fit = "signal fit @roam-small?n=100 --k 20 --l 15 --m 8 --window 40 --overlap 10";
+    let fit = "signal fit @roam-small:100 --k 20 --l 15 --m 8 --window 40 --overlap 10";
     must(&words(&format!("{fit} -o {rep}")));
     let sampled = |times: &str, name: &str| {
         let out = scratch.arg(name);

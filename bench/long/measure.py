@@ -59,7 +59,7 @@ def repeated(arguments, repeat, limit):
 def row(name, n, way, choice, folder, options):
     """Fits and samples once: a line of the table."""
     rep, told, out = folder / "rep.npz", folder / "told.json", folder / "out.npz"
-    sequence = f"{name}?n={n}"
+    sequence = f"{name}:{n}"
     fit = ["signal", "fit", sequence, "--tolerance", options.tolerance, *choice, "-o", rep, "--json", told]
     line = {"sequence": name, "n": n, "way": way, "repeats": options.repeat}
     found = repeated(fit, options.repeat, options.limit)

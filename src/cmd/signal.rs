@@ -38,7 +38,7 @@ use crate::signal::windows_fit::frame_spread;
 
 const EXAMPLES: &str = "Examples:
   meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json
-  meshseq signal fit @roam-small?n=300 --tolerance 0.01 --window 120 --overlap 16 -o roam.npz
+  meshseq signal fit @roam-small:300 --tolerance 0.01 --window 120 --overlap 16 -o roam.npz
 
 --window fits as few windows as hold N frames each, one after another, and joins them smoothly: for
 sequences that are long, or larger than memory. `signal sample` and `signal info` read what it writes.";

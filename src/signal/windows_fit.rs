@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn errors_are_those_of_the_joined_frames_and_below_those_of_the_windows() {
-        let name = "@roam-small?n=110";
+        let name = "@roam-small:110";
         let sequence = open(name).unwrap();
         let plan = Plan::new(110, 45, 9).unwrap();
         assert_eq!(plan.windows().len(), 3);
@@ -215,7 +215,7 @@ mod tests {
     /// value, speed and acceleration are the window's. Between, it bends no more than the product rule allows.
     #[test]
     fn joins_are_smooth() {
-        let name = "@roam-small?n=90";
+        let name = "@roam-small:90";
         let plan = Plan::new(90, 50, 10).unwrap();
         let (mut file, ..) = joined(name, &plan, [30, 22, 12]);
         let (a, b) = (plan.windows()[0].clone(), plan.windows()[1].clone());

@@ -23,7 +23,7 @@ fn fit(scratch: &Scratch, sequence: &str, choice: &[&str], words: &[&str]) {
 #[test]
 fn windows_that_cannot_be() {
     let scratch = good();
-    let long = "@roam-small?n=30";
+    let long = "@roam-small:30";
     for window in ["0", "1", "5"] {
         fit(
             &scratch,
@@ -62,8 +62,13 @@ fn windows_that_cannot_be() {
         &[&start[..], &choice, &["-o", &out]].concat(),
         &["window 1, frames 1 to", "k = 15", "<= k <="],
     );
-    for name in ["@roam-small?n=0", "@roam-small?n=x", "@gallop?n=100"] {
-        fit(&scratch, name, &["--window", "12"], &["?n=", "@roam"]);
+    for name in ["@roam-small:0", "@roam-small:x", "@gallop:100"] {
+        fit(
+            &scratch,
+            name,
+            &["--window", "12"],
+            &["1 to 1000000", "@roam"],
+        );
     }
     let choice = ["--window", "12"];
     fit(&scratch, &scratch.arg("none"), &choice, &["no such file"]);
@@ -110,7 +115,7 @@ impl Bad {
     fn new(space: &str) -> Self {
         let scratch = Scratch::new();
         let rep = scratch.arg("windows.npz");
-        let fit = ["signal", "fit", "@roam-small?n=20", "--window", "12"];
+        let fit = ["signal", "fit", "@roam-small:20", "--window", "12"];
         let space = ["--space", space, "-o", &rep];
         must(&[&fit, &FIT[..], &space].concat());
         let arrays = npz::read_arrays(&scratch.at("windows.npz")).unwrap();

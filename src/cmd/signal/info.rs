@@ -10,7 +10,7 @@ use super::super::output::{check_place, draft_json, say};
 use crate::signal::windows_file::WindowsFile;
 
 pub const EXAMPLES: &str = "Examples:
-  meshseq signal fit @roam-small?n=200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
+  meshseq signal fit @roam-small:200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
   meshseq signal info roam.npz --json roam.json";
 
 #[derive(Args)]

@@ -19,7 +19,7 @@ pub const EXAMPLES: &str = "Examples:
   meshseq signal sample gallop.npz --rate 1.5 -o half-again-as-many
   printf 'frame,time\\n1,1\\n30,12\\n36,24\\n' > slow-then-fast.csv
   meshseq signal sample gallop.npz --warp slow-then-fast.csv -o warped.npz
-  meshseq signal fit @roam-small?n=200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
+  meshseq signal fit @roam-small:200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
   meshseq signal sample roam.npz --rate 2 -o twice-as-many.pc2";
 
 #[derive(Args)]

@@ -4,7 +4,7 @@
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
 //! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests. Most are motions; `@face`,
 //! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time. `@roam` goes on for ever:
-//! `@roam?n=5000` are its first 5,000 frames, which [`stream_embedded`] makes one by one.
+//! `@roam:5000` are its first 5,000 frames, which [`stream_embedded`] makes one by one.
 
 pub mod animals;
 pub mod bar;
@@ -90,7 +90,7 @@ pub enum SyntheticError {
     },
     /// A length that cannot be given.
     #[error(
-        "{name}: expected ?n= and a number of frames from 1 to {MOST_FRAMES}, for a motion without an end: one of {endless}"
+        "{name}: expected a number of frames from 1 to {MOST_FRAMES} behind the colon, and a motion without an end: one of {endless}"
     )]
     BadLength {
         /// The name asked for.
@@ -120,7 +120,7 @@ pub enum SyntheticError {
 /// The longest that an endless motion is asked for.
 pub const MOST_FRAMES: usize = 1_000_000;
 
-/// Makes the embedded sequence of this name (with its `@`, as in [`catalogue`]). A name and `?n=N` are the first N frames of a motion that has no
+/// Makes the embedded sequence of this name (with its `@`, as in [`catalogue`]). A name and `:N` are the first N frames of a motion that has no
 /// end.
 pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
     match asked(name)? {
@@ -144,14 +144,14 @@ enum Asked {
 }
 
 fn asked(name: &str) -> Result<Asked, SyntheticError> {
-    let Some((base, length)) = name.split_once('?') else {
+    let Some((base, length)) = name.split_once(':') else {
         let entry = entry(name)?;
         return Ok(match entry.endless {
             Some(motion) => Asked::Endless(motion, entry.frames),
             None => Asked::Whole(entry),
         });
     };
-    let length = length.strip_prefix("n=").and_then(|n| n.parse().ok());
+    let length = length.parse().ok();
     let length = length.filter(|n| (1..=MOST_FRAMES).contains(n));
     match (entry(base)?.endless, length) {
         (Some(motion), Some(frames)) => Ok(Asked::Endless(motion, frames)),
@@ -401,7 +401,7 @@ const CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "@roam",
-        summary: "a quadruped in place that changes between gallop and trot and never repeats; @roam?n=5000 for 5,000 frames",
+        summary: "a quadruped in place that changes between gallop and trot and never repeats; @roam:5000 for 5,000 frames",
         frames: roam::FRAMES,
         vertices: 4082,
         faces: 8160,
@@ -411,7 +411,7 @@ const CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "@roam-small",
-        summary: "@roam with the animal of @gallop-small, fewer frames unless ?n= says how many",
+        summary: "@roam with the animal of @gallop-small, fewer frames unless it says how many",
         frames: roam::SMALL_FRAMES,
         vertices: 634,
         faces: 1264,
@@ -573,17 +573,17 @@ mod tests {
 
     #[test]
     fn endless_motions_have_any_length_and_others_their_own() {
-        let (short, long) = (embedded("@roam-small?n=7"), embedded("@roam-small"));
+        let (short, long) = (embedded("@roam-small:7"), embedded("@roam-small"));
         let (short, long) = (short.unwrap(), long.unwrap());
         assert_eq!(short.frame_count(), 7);
         assert_eq!(short.positions(), &long.positions()[..7 * long.dimension()]);
         for name in [
-            "@roam?n=0",
-            "@roam?n=1000001",
-            "@roam?n=",
-            "@roam?frames=3",
-            "@roam?n=-3",
-            "@gallop?n=48",
+            "@roam:0",
+            "@roam:1000001",
+            "@roam:",
+            "@roam:three",
+            "@roam:-3",
+            "@gallop:48",
         ] {
             let refused = stream_embedded(name).err().unwrap();
             assert!(
@@ -593,7 +593,7 @@ mod tests {
             assert_eq!(embedded(name).unwrap_err(), refused);
             assert!(refused.to_string().contains("one of @roam, @roam-small"));
         }
-        let unknown = embedded("@rome?n=3").unwrap_err();
+        let unknown = embedded("@rome:3").unwrap_err();
         assert!(matches!(unknown, SyntheticError::Unknown { .. }));
     }
 

@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn no_frame_is_another_one_however_long_it_goes_on() {
-        let roam = embedded("@roam-small?n=1500").unwrap();
+        let roam = embedded("@roam-small:1500").unwrap();
         let scale = checks::diagonal(roam.frame(0)) * (roam.dimension() as f64 / 3.0).sqrt();
         for i in 0..roam.frame_count() {
             for j in (0..i).filter(|j| (i - j) % 24 < 2 || (i - j) % 32 < 2) {
