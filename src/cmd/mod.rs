@@ -19,7 +19,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::harness::case::Frames;
 use crate::sequence::Sequence;
 use crate::sequence::dataset::{open, open_stream};
-use crate::sequence::stream::FrameStream;
+use crate::sequence::format::stream::FrameStream;
 
 /// Anything that ends a verb with exit code 2.
 type Failure = Box<dyn std::error::Error>;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::Sequence;
+use super::format::stream::FrameStream;
 use super::format::{FormatError, frame_files, read, stream};
-use super::stream::FrameStream;
 use super::synthetic::{SyntheticError, embedded, stream_embedded};
 
 /// Why there is no such sequence.

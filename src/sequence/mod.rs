@@ -2,7 +2,6 @@
 
 pub mod dataset;
 pub mod format;
-pub mod stream;
 pub mod synthetic;
 
 use std::sync::Arc;

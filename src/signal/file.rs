@@ -27,7 +27,6 @@ use super::g::PoseSignal;
 use super::in_space::sample_in_space;
 use super::psi::{Representation, TimeSignal};
 use super::windows::PlanError;
-use super::windows_file;
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::mesh::{Connectivity, ConnectivityError};
 use crate::sequence::format::{FormatError, npz};
@@ -37,6 +36,8 @@ use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare};
 /// Frames whose vectors in the shape space are held at a time, for they are several times as long as positions.
 pub const AT_A_TIME: usize = 32;
 const FORMAT: &str = "meshseq signal 1";
+/// The format of [`super::windows_file`].
+pub(super) const WINDOWS_FORMAT: &str = "meshseq signal windows 1";
 
 /// A representation and the mesh it deforms.
 #[derive(Clone, Debug, PartialEq)]
@@ -164,7 +165,7 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
     let place = path.display().to_string();
     let bundle = Bundle(npz::read_arrays(path)?.into_iter().collect());
     let text = bundle.text("meta").map_err(|e| arrays(&place, e))?;
-    if named_format(text) == Some(windows_file::FORMAT) {
+    if named_format(text) == Some(WINDOWS_FORMAT) {
         return Err(RepresentationError::InWindows { path: place });
     }
     let space = space_of(text, FORMAT).map_err(|what| inconsistent(&place, what))?;
@@ -310,7 +311,7 @@ fn mismatch(r: &Representation, positions: &[Point]) -> Option<String> {
 /// The format that `meta` names, where this program writes it.
 fn named_format(meta: &str) -> Option<&'static str> {
     let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
-    let ours = [FORMAT, windows_file::FORMAT];
+    let ours = [FORMAT, WINDOWS_FORMAT];
     ours.into_iter().find(|format| meta["format"] == *format)
 }
 

@@ -170,6 +170,37 @@ fn smooth_step(s: f64) -> f64 {
     s * s * s * (10.0 + s * (6.0 * s - 15.0))
 }
 
+/// Frames at times in [1, n], 3V positions each, of which `sample` gives those of a window at times of its own. Asks for every window at most once, in
+/// ascending order.
+pub(super) fn blend<E>(
+    plan: &Plan,
+    times: &[f64],
+    mut sample: impl FnMut(usize, &[f64]) -> Result<Vec<f64>, E>,
+) -> Result<Vec<f64>, E> {
+    let mut parts: Vec<(usize, usize, f64)> = Vec::new();
+    for (i, &t) in times.iter().enumerate() {
+        parts.extend(plan.weights(t).map(|(window, weight)| (window, i, weight)));
+    }
+    parts.sort_by_key(|&(window, i, _)| (window, i));
+    let mut frames = Vec::new();
+    for part in parts.chunk_by(|a, b| a.0 == b.0) {
+        let start = plan.windows()[part[0].0].start as f64;
+        let own: Vec<f64> = part.iter().map(|&(_, i, _)| times[i] - start).collect();
+        let sampled = sample(part[0].0, &own)?;
+        let d = sampled.len() / own.len();
+        if frames.is_empty() && own.len() == times.len() && part.iter().all(|p| p.2 == 1.0) {
+            return Ok(sampled);
+        }
+        frames.resize(d * times.len(), 0.0);
+        for (&(_, i, weight), frame) in part.iter().zip(sampled.chunks_exact(d.max(1))) {
+            let sum = &mut frames[i * d..(i + 1) * d];
+            let terms = sum.iter_mut().zip(frame);
+            terms.for_each(|(s, x)| *s += weight * x);
+        }
+    }
+    Ok(frames)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,18 +13,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::file::{
-    OWN, RepresentationError, Stored, inconsistent, load, mesh, meta, over, own, own_arrays,
-    space_of,
+    OWN, RepresentationError, Stored, WINDOWS_FORMAT as FORMAT, inconsistent, load, mesh, meta,
+    over, own, own_arrays, space_of,
 };
-use super::windows::Plan;
+use super::windows::{Plan, blend};
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::mesh::Connectivity;
-use crate::sequence::format::FormatError;
 use crate::sequence::format::npz::{Archive, Writer};
 use crate::shape::{ShapeError, Space, SpaceKind};
 use thiserror::Error;
 
-pub(super) const FORMAT: &str = "meshseq signal windows 1";
 /// A window and the one that follows it.
 const HELD: usize = 2;
 
@@ -266,36 +264,6 @@ impl WindowsFile {
     }
 }
 
-/// Frames at times in [1, n], 3V positions each, of which `sample` gives those of a window at times of its own.
-pub(super) fn blend<E>(
-    plan: &Plan,
-    times: &[f64],
-    mut sample: impl FnMut(usize, &[f64]) -> Result<Vec<f64>, E>,
-) -> Result<Vec<f64>, E> {
-    let mut parts: Vec<(usize, usize, f64)> = Vec::new();
-    for (i, &t) in times.iter().enumerate() {
-        parts.extend(plan.weights(t).map(|(window, weight)| (window, i, weight)));
-    }
-    parts.sort_by_key(|&(window, i, _)| (window, i));
-    let mut frames = Vec::new();
-    for part in parts.chunk_by(|a, b| a.0 == b.0) {
-        let start = plan.windows()[part[0].0].start as f64;
-        let own: Vec<f64> = part.iter().map(|&(_, i, _)| times[i] - start).collect();
-        let sampled = sample(part[0].0, &own)?;
-        let d = sampled.len() / own.len();
-        if frames.is_empty() && own.len() == times.len() && part.iter().all(|p| p.2 == 1.0) {
-            return Ok(sampled);
-        }
-        frames.resize(d * times.len(), 0.0);
-        for (&(_, i, weight), frame) in part.iter().zip(sampled.chunks_exact(d.max(1))) {
-            let sum = &mut frames[i * d..(i + 1) * d];
-            let terms = sum.iter_mut().zip(frame);
-            terms.for_each(|(s, x)| *s += weight * x);
-        }
-    }
-    Ok(frames)
-}
-
 /// What a file of windows holds beside them.
 fn head(archive: &mut Archive, place: &str) -> Result<(Plan, SpaceKind, Bundle), SampleError> {
     let mut bundle = Bundle::default();
@@ -345,7 +313,7 @@ fn ranges(bundle: &Bundle) -> Result<Vec<std::ops::Range<usize>>, ArrayError> {
 
 /// The coordinates of a frame in vertex space.
 fn first_length(archive: &mut Archive) -> Result<usize, RepresentationError> {
-    let offset = archive.read(&place(0, "h0")).map_err(FormatError::from)?;
+    let offset = archive.read(&place(0, "h0"))?;
     Ok(match offset {
         Array::F64 { data, .. } => data.len(),
         _ => 0,

@@ -1,10 +1,9 @@
 //! Signals fitted to a long sequence, a window at a time: memory is that of two windows, however long the sequence.
 
 use super::file::{AT_A_TIME, Stored};
-use super::windows::Plan;
-use super::windows_file::blend;
+use super::windows::{Plan, blend};
 use crate::sequence::format::FormatError;
-use crate::sequence::stream::FrameStream;
+use crate::sequence::format::stream::FrameStream;
 use crate::sequence::{Sequence, SequenceError};
 use crate::shape::{ShapeError, Space};
 

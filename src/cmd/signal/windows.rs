@@ -55,7 +55,7 @@ pub fn run(verb: &FitVerb, window: usize, how: How) -> Outcome {
         told.push(window_numbers(&plan, j, &fitted, *size));
         Ok(fitted.stored(frames, how.space, reference.clone()))
     };
-    let named = |frames: &Sequence, j: usize| {
+    let named = |frames: &Sequence, j: usize| -> Result<Stored, Failure> {
         let (from, to) = (plan.windows()[j].start + 1, plan.windows()[j].end);
         fit_window(frames, j)
             .map_err(|e| format!("window {}, frames {from} to {to}: {e}", j + 1).into())

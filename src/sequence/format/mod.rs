@@ -17,12 +17,13 @@ pub mod npz;
 mod obj;
 mod pc2;
 pub mod peer_tobj;
+pub mod stream;
 mod writer;
 
 use std::path::{Path, PathBuf};
 
+use self::stream::FrameStream;
 use super::Sequence;
-use super::stream::FrameStream;
 pub use error::FormatError;
 pub use files::frame_files;
 use files::has_extension;

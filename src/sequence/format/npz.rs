@@ -20,7 +20,7 @@ use super::error::FormatError;
 use crate::arrays::Array;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::sequence::stream::FrameStream;
+use crate::sequence::format::stream::FrameStream;
 pub use archive::Archive;
 pub use problem::NpzProblem;
 

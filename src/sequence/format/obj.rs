@@ -25,7 +25,7 @@ use super::bytes;
 use super::error::FormatError;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::sequence::stream::{FrameStream, Source};
+use crate::sequence::format::stream::{FrameStream, Source};
 use parse::{Fault, Summary, Visitor};
 pub use problem::ObjProblem;
 pub(super) use write::{FolderWriter, write_frame};

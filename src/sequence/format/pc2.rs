@@ -14,7 +14,7 @@ use super::files::frame_files;
 use super::obj;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
-use crate::sequence::stream::Source;
+use crate::sequence::format::stream::Source;
 
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;

@@ -44,7 +44,7 @@ use thiserror::Error;
 
 use self::animals::Animal;
 use self::motion::Motion;
-use super::stream::FrameStream;
+use super::format::stream::FrameStream;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
 

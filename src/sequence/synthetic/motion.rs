@@ -9,7 +9,7 @@ use super::SyntheticError;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
 use crate::sequence::format::FormatError;
-use crate::sequence::stream::{FrameStream, Source};
+use crate::sequence::format::stream::{FrameStream, Source};
 
 /// A mesh that moves, given in closed form at every frame.
 pub(super) struct Motion {

@@ -9,7 +9,7 @@ use super::zip_read::{self, Contents, Entry, ZipError};
 use super::{Array, NpzProblem, elements};
 use crate::sequence::format::bytes;
 use crate::sequence::format::error::FormatError;
-use crate::sequence::stream::Source;
+use crate::sequence::format::stream::Source;
 
 /// Deflate cannot pack better than this.
 const DEFLATE_LIMIT: u64 = 1032;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::format::FormatError;
-use super::{Sequence, SequenceError, first_not_finite};
+use super::error::FormatError;
 use crate::mesh::Connectivity;
+use crate::sequence::{Sequence, SequenceError, first_not_finite};
 
 /// Where frames come from.
 pub trait Source {
