@@ -114,14 +114,6 @@ impl Seek for Draft {
     }
 }
 
-/// Writes a file whole or not at all: under a temporary name in the same folder, then renamed.
-pub(super) fn write_file(
-    path: &Path,
-    fill: impl FnOnce(&mut Draft) -> io::Result<()>,
-) -> Result<(), FormatError> {
-    Draft::write(path, fill)?.keep()
-}
-
 /// A folder of frames under a temporary name beside its destination; dropping it removes it and all that it holds.
 pub(super) struct FolderDraft {
     folder: tempfile::TempDir,
@@ -236,6 +228,13 @@ fn temporary(mode: u32) -> tempfile::Builder<'static, 'static> {
 mod tests {
     use super::*;
     use std::fs::OpenOptions;
+
+    fn write_file(
+        path: &Path,
+        fill: impl FnOnce(&mut Draft) -> io::Result<()>,
+    ) -> Result<(), FormatError> {
+        Draft::write(path, fill)?.keep()
+    }
 
     /// Takes `room` bytes, then fails as a full disk does.
     struct Limited<W> {

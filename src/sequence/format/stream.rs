@@ -123,7 +123,6 @@ impl Source for Held {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::sequence::dataset::{open, open_stream};
     use crate::sequence::format::write;
 
