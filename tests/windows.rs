@@ -54,7 +54,7 @@ fn the_tolerance_holds_over_the_whole_sequence() {
 fn the_frames_matter_and_not_where_they_are_read_from() {
     let scratch = Scratch::new();
     let sequence = open("@roam-small:60").unwrap();
-    let choice = "--k 20 --l 15 --m 8 --window 24 --overlap 5";
+    let choice = "--k 16 --l 12 --m 8 --window 24 --overlap 5";
     let fitted = |source: &str| {
         let rep = scratch.arg("rep.npz");
         must(&words(&format!("signal fit {source} {choice} -o {rep}")));

@@ -309,7 +309,7 @@ fn mismatch(r: &Representation, positions: &[Point]) -> Option<String> {
 }
 
 /// The format that `meta` names, where this program writes it.
-fn named_format(meta: &str) -> Option<&'static str> {
+pub(super) fn named_format(meta: &str) -> Option<&'static str> {
     let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
     let ours = [FORMAT, WINDOWS_FORMAT];
     ours.into_iter().find(|format| meta["format"] == *format)

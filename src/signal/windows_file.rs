@@ -130,7 +130,7 @@ impl WindowsFile {
     pub fn open(path: &Path) -> Result<Self, SampleError> {
         let place = path.display().to_string();
         let mut archive = Archive::open(path).map_err(RepresentationError::from)?;
-        if !archive.names().any(|name| name == "windows") {
+        if !is_windows(&mut archive) {
             return Self::whole(load(path)?, place);
         }
         let (plan, space, bundle) = head(&mut archive, &place)?;
@@ -262,6 +262,14 @@ impl WindowsFile {
             }),
         }
     }
+}
+
+/// Whether a file has windows or says that it has.
+fn is_windows(archive: &mut Archive) -> bool {
+    let meta = archive.read("meta");
+    let says =
+        |meta: &Array| matches!(meta, Array::Text(text) if named_format(text) == Some(FORMAT));
+    archive.names().any(|name| name == "windows") || meta.is_ok_and(|meta| says(&meta))
 }
 
 /// What a file of windows holds beside them.

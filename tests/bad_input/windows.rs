@@ -148,12 +148,12 @@ impl Bad {
 #[test]
 fn files_of_windows_that_are_none() {
     let bad = Bad::new("vertex");
-    for name in ["meta", "overlap", "F", "0/h0", "1/H", "1/p", "0/u"] {
+    for name in [
+        "meta", "windows", "overlap", "F", "0/h0", "1/H", "1/p", "0/u",
+    ] {
         bad.with(|b| drop(b.0.remove(name)), &[name]);
         bad.with(|b| b.put(name, Array::vector(&[1.0, 2.0])), &[]);
     }
-    // Without it, it is no representation at all.
-    bad.with(|b| drop(b.0.remove("windows")), &["signal fit"]);
     let windows = |shape: [usize; 2], data: &[i64]| {
         let (shape, data) = (shape.to_vec(), data.to_vec());
         move |b: &mut Bundle| b.put("windows", Array::I64 { shape, data })
