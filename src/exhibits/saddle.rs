@@ -51,7 +51,7 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
         look: format!(
             "Look for squares on amber ground: `mds` puts stretches of the motion side by side that are alike in the plane only, g has to bend between them, \
              and halfway from frame {} to the next the shape belongs to neither. `ordered` pulls the stretches apart, without pins, and the same in-between is \
-             one of its neighbours.",
+             like both.",
             worst.floor()
         ),
         datasets: vec![dataset.into()],
@@ -223,5 +223,42 @@ fn table(runs: &[&Run], worst: f64) -> Table {
         ]
         .to_vec(),
         rows: runs.iter().map(row).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn saddles_lie_beside_the_curve_of_the_papers_layout_alone() {
+        let exhibit = exhibit(&DataFolders::new(Some("no data".as_ref()))).unwrap();
+        let Some(Panel::Table(table)) = exhibit.panels.last() else {
+            panic!("the last panel is no table");
+        };
+        let number = |row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
+        // Astray, and on saddles; then the one that strays the most.
+        assert!(
+            number(0, 1) > 10.0 && number(0, 2) > 0.5 * number(0, 1),
+            "{:?}",
+            table.rows
+        );
+        assert!(number(1, 1) < 0.1 * number(0, 1), "{:?}", table.rows);
+        assert!(
+            number(0, 3) > 1.0 && number(1, 4) < 0.25,
+            "{:?}",
+            table.rows
+        );
+        let grounds = exhibit.panels.iter().filter_map(|panel| match panel {
+            Panel::Chart(chart) => chart.ground.as_ref(),
+            _ => None,
+        });
+        let steep: Vec<usize> = grounds
+            .map(|ground| {
+                assert_eq!(ground.cells.len() % ground.across, 0);
+                ground.cells.matches('2').count()
+            })
+            .collect();
+        assert!(steep[0] > 0 && steep[2] < steep[0], "{steep:?}");
     }
 }

@@ -13,9 +13,9 @@ use crate::exhibits::{Chart, Ground, Line, Style};
 const COLOURS: [RGBColor; 6] = [VERMILION, BLUE, GREEN, PURPLE, GREY, INK];
 /// Of the kinds of a ground's cells: two of amber and one of green, pale enough for lines upon them.
 const GROUNDS: [RGBColor; 3] = [
-    RGBColor(255, 240, 204),
-    RGBColor(248, 208, 130),
-    RGBColor(208, 235, 222),
+    RGBColor(255, 234, 184),
+    RGBColor(245, 190, 90),
+    RGBColor(196, 230, 214),
 ];
 const SIZE: (i32, i32) = (520, 380);
 /// What the sides, and what legend and axis, take from the picture.
