@@ -218,7 +218,7 @@ pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeEr
 pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let mut z = encode_each(space, frames)?;
     if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {
-        others.iter_mut().for_each(|z| {
+        others.par_iter_mut().for_each(|z| {
             space.unwrap(first, z);
             space.unwrap_over_surface(z);
         });
