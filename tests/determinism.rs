@@ -46,6 +46,15 @@ fn words(text: &str) -> Vec<String> {
 }
 
 #[test]
+fn self_intersections_do_not_depend_on_threads() {
+    for sequence in ["@klein-small", "@trot-small"] {
+        same_bytes("quality.csv", |out| {
+            words(&format!("info {sequence} --quality {out}"))
+        });
+    }
+}
+
+#[test]
 fn fits_do_not_depend_on_threads() {
     for choice in [
         "@gallop-small --k 16 --l 12 --m 7",

@@ -11,6 +11,8 @@ mod halfway;
 mod patched;
 mod pipeline;
 mod pose;
+mod quality;
+mod refinement;
 mod scaling;
 mod shape;
 mod sparse;
@@ -37,6 +39,7 @@ fn judge(stage: &str) -> Option<Judge> {
     let (own, against): (Own, Against) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
+        "mesh.quality" => (quality::own, quality::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
         "shape.lengths_encode" => (edge_lengths::own, edge_lengths::against),
@@ -60,6 +63,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.psi" => (chain::psi_own, chain::psi_against),
         "signal.insert_knots" => (time::more_knots_own, time::more_knots_against),
         "signal.transfer" => (transfer::own, transfer::against),
+        "signal.refine" => (refinement::own, refinement::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };
