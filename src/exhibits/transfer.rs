@@ -158,3 +158,21 @@ fn example_error(given: &Given, from: &dyn Space, to: &dyn Space) -> Result<f64,
     let diagonal = bounds(given.target.frame(0)).diagonal();
     Ok(gaps.fold(0.0, f64::max) / diagonal)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn examples_turn_into_their_partners_and_no_face_inside_out() {
+        let exhibit = exhibit(&DataFolders::new(Some("no data".as_ref()))).unwrap();
+        let Some(Panel::Table(table)) = exhibit.panels.last() else {
+            panic!("the last panel is no table");
+        };
+        for row in &table.rows {
+            assert!(row[1].parse::<f64>().unwrap() < 1e-9, "{row:?}");
+        }
+        let gradient = table.rows.iter().find(|row| row[0] == "gradient").unwrap();
+        assert_eq!(gradient[2], "0");
+    }
+}

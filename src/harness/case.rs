@@ -117,6 +117,8 @@ struct Entry {
     measure: bool,
     #[serde(default)]
     draw: bool,
+    #[serde(default = "yes")]
+    means: bool,
     published: Option<Published>,
 }
 
@@ -140,6 +142,10 @@ struct Published {
 
 fn one() -> usize {
     1
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn two_minutes() -> u64 {
@@ -239,6 +245,7 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
             knots: knots(entry.knots.as_deref())?,
             pins: entry.pins,
             space: space(entry.space.as_deref())?,
+            means: entry.means,
         },
         expect: expectations(&entry.expect)?,
         tolerances: tolerances(stage.name, entry.check)?,

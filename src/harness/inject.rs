@@ -86,6 +86,22 @@ faults! {
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
+    "lengths-relative" in "shape.lengths_encode": "every number a millionth too large",
+        Outputs(|_, out| numbers(out, "z", stretch));
+    "lengths-inside-out" in "shape.lengths_encode": "the surface bent the other way: the sign of every angle",
+        Outputs(|inputs, out| {
+            let edges = crate::mesh::topology::Topology::new(&inputs.triangles("F").unwrap_or_default()).fans().count();
+            let d = row_length(out, "z");
+            numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[..2 * edges].chunks_mut(2).for_each(|e| e[1] = -e[1])));
+        });
+    "lengths-turn-dropped" in "shape.lengths_encode": "components without their rotation",
+        Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
+    "lengths-bent" in "shape.lengths_decode": "the edges of the last frame bent a millionth more",
+        Inputs(|inputs| last_frame(inputs, |z| { let edges = z.len() / 2 - 3; z[..2 * edges].chunks_mut(2).for_each(|e| e[1] *= 1.0 + SLIGHT) }));
+    "lengths-wrong-frame" in "shape.lengths_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "lengths-frames" in "shape.lengths_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
     "poisson-entry" in "shape.poisson_factor": "the last entry of the matrix twice",
         Inputs(|inputs| numbers(inputs, "values", |v| { let at = v.len() - 1; v[at] *= 2.0 }));
     "poisson-relative" in "shape.poisson_solve": "solutions a millionth too large",

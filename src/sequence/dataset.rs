@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::format::{FormatError, frame_files, read};
-use super::synthetic::{SyntheticError, embedded};
+use super::format::stream::FrameStream;
+use super::format::{FormatError, frame_files, read, stream};
+use super::synthetic::{SyntheticError, embedded, stream_embedded};
 use super::{Sequence, SequenceError};
 
 /// Why there is no such sequence.
@@ -88,6 +89,14 @@ impl DataFolders {
             },
         })
     }
+}
+
+/// Opens what [`open`] reads, to be read some frames at a time.
+pub fn open_stream(argument: &str) -> Result<FrameStream, DatasetError> {
+    if argument.starts_with('@') {
+        return Ok(stream_embedded(argument)?);
+    }
+    Ok(stream(Path::new(argument))?)
 }
 
 /// A sequence that a user names on the command line: `@name`, or a path.

@@ -521,6 +521,8 @@ pub struct Choice {
     pub knots: KnotRule,
     pub pins: usize,
     pub space: SpaceKind,
+    /// Whether a decode stage is given means of neighbouring frames too, which poses that no motion joins have none of.
+    pub means: bool,
 }
 
 /// The reconstruction, from which the inputs of its stages are taken.

@@ -4,6 +4,7 @@
 
 mod chain;
 mod distance;
+mod edge_lengths;
 mod encoding;
 mod forms;
 mod halfway;
@@ -41,6 +42,8 @@ fn judge(stage: &str) -> Option<Judge> {
         "mesh.quality" => (quality::own, quality::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
+        "shape.lengths_encode" => (edge_lengths::own, edge_lengths::against),
+        "shape.lengths_decode" => (edge_lengths::descended_own, encoding::decoded_against),
         "shape.patch_encode" => (patched::own, patched::against),
         "shape.gradient_decode" | "shape.lric_decode" | "shape.patch_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
