@@ -180,7 +180,13 @@ fn a_descent_with_sites_held_ends_where_the_error_is_flat() {
         };
         let found = minimise(&rows, &spline, &unknowns.sites, m, &held).unwrap();
         assert_eq!(found.signals.pose.sites, unknowns.sites);
-        assert!(found.gradient < 1e-6, "{m}: {}", found.gradient);
+        // The gradient is -2 J^T r: beside |r| and the size of what J is made of. Rounding in |r|^2 hides smaller ones.
+        let data = rows.targets.squared_norm_l2();
+        let flat = found.gradient * (found.error / data).sqrt();
+        assert!(
+            flat < 1e-6 && found.iterations < 2000,
+            "{m}: {flat} {found:?}"
+        );
         let start = minimise(
             &rows,
             &spline,
