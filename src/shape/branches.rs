@@ -45,7 +45,7 @@ impl Neighbours {
     /// least (the lowest of equals), whose angle stays in [0, pi].
     ///
     /// Where a member is folded over against its neighbours its branch means little, and whatever were reached through it would be torn from the rest. So
-    /// the next member reached is the one that is surest, by each of [`SUREST`] in turn, and the answer is kept that tears the fewest pairs apart.
+    /// the next member reached is the one that is surest, by each of `SUREST` in turn, and the answer is kept that tears the fewest pairs apart.
     /// O((count + pairs) log pairs).
     pub fn unwrap(&self, vectors: &mut [&mut [f64; 3]]) {
         let given: Vec<Vector> = vectors.iter().map(|v| **v).collect();
