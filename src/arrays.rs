@@ -30,6 +30,14 @@ impl Array {
         }
     }
 
+    /// Positions x0 y0 z0 x1 ... as a (V, 3) array.
+    pub fn vertices(positions: &[f64]) -> Self {
+        Self::F64 {
+            shape: vec![positions.len() / 3, 3],
+            data: positions.to_vec(),
+        }
+    }
+
     /// One whole number.
     pub fn integer(value: usize) -> Self {
         Self::I64 {

@@ -46,6 +46,15 @@ fn words(text: &str) -> Vec<String> {
 }
 
 #[test]
+fn self_intersections_do_not_depend_on_threads() {
+    for sequence in ["@klein-small", "@trot-small"] {
+        same_bytes("quality.csv", |out| {
+            words(&format!("info {sequence} --quality {out}"))
+        });
+    }
+}
+
+#[test]
 fn fits_do_not_depend_on_threads() {
     for choice in [
         "@gallop-small --k 16 --l 12 --m 7",
@@ -53,6 +62,9 @@ fn fits_do_not_depend_on_threads() {
         "@jelly-small --tolerance 0.01",
         "@gallop-small --frames 1..20 --every 2 --k 12 --l 10 --m 9",
         "@jelly-small --k 20 --l 15 --m 9 --space patch",
+        "@roam-small:90 --k 20 --l 15 --m 9 --window 40 --overlap 9",
+        "@roam-small:90 --tolerance 0.01 --window 40",
+        "@roam-small --k 14 --l 10 --m 6 --window 25 --space patch",
     ] {
         same_bytes("rep.npz", |out| {
             words(&format!("signal fit {choice} -o {out}"))
@@ -80,15 +92,17 @@ fn long_fits_do_not_depend_on_threads() {
 #[test]
 fn conversions_and_samples_do_not_depend_on_threads() {
     let scratch = Scratch::new();
-    let rep = scratch.arg("rep.npz");
-    must(&words(&format!(
-        "signal fit @gallop-small --k 16 --l 12 --m 7 -o {rep}"
-    )));
+    let [rep, windows] = ["rep.npz", "windows.npz"].map(|name| scratch.arg(name));
+    let fit = "signal fit @gallop-small --k 16 --l 12 --m 7 -o";
+    must(&words(&format!("{fit} {rep}")));
+    must(&words(&format!("{fit} {windows} --window 18")));
     for name in ["a.npz", "a.pc2", "frames"] {
         same_bytes(name, |out| words(&format!("convert @jelly-small {out}")));
-        same_bytes(name, |out| {
-            words(&format!("signal sample {rep} --frames 61 -o {out}"))
-        });
+        for rep in [&rep, &windows] {
+            same_bytes(name, |out| {
+                words(&format!("signal sample {rep} --frames 61 -o {out}"))
+            });
+        }
     }
     same_bytes("info.json", |out| {
         words(&format!("info @jelly-small --json {out}"))

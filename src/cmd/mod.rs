@@ -16,6 +16,11 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::harness::case::Frames;
+use crate::sequence::Sequence;
+use crate::sequence::dataset::{open, open_stream};
+use crate::sequence::format::stream::FrameStream;
+
 /// Anything that ends a verb with exit code 2.
 type Failure = Box<dyn std::error::Error>;
 /// Whether all checks held.
@@ -56,7 +61,9 @@ enum Verb {
     #[command(after_help = "Example: meshseq data --data ~/meshes")]
     Data(data::Data),
     /// What a sequence is: counts, measures, defects
-    #[command(after_help = "Example: meshseq info @gallop-small --json info.json")]
+    #[command(
+        after_help = "Example: meshseq info @gallop-small --json info.json --quality quality.csv"
+    )]
     Info(info::Info),
     /// A sequence in another format
     #[command(after_help = "Example: meshseq convert @gallop-small gallop.npz")]
@@ -86,21 +93,48 @@ struct FrameChoice {
 }
 
 impl FrameChoice {
-    fn open(&self, argument: &str) -> Result<crate::sequence::Sequence, Failure> {
-        let mut frames: crate::harness::case::Frames =
-            self.frames.parse().map_err(|e| format!("--{e}"))?;
+    fn open(&self, argument: &str) -> Result<Sequence, Failure> {
+        let frames = self.parsed()?;
+        let sequence = open(argument)?;
+        match self.indices(argument, frames, sequence.frame_count())? {
+            Some(indices) => Ok(sequence.select(&indices)?),
+            None => Ok(sequence),
+        }
+    }
+
+    /// The same, to be read some frames at a time.
+    fn stream(&self, argument: &str) -> Result<FrameStream, Failure> {
+        let frames = self.parsed()?;
+        let stream = open_stream(argument)?;
+        match self.indices(argument, frames, stream.frame_count())? {
+            Some(indices) => Ok(stream
+                .select(&indices)
+                .ok_or("--frames: expected ascending frames")?),
+            None => Ok(stream),
+        }
+    }
+
+    fn parsed(&self) -> Result<Frames, Failure> {
+        let mut frames: Frames = self.frames.parse().map_err(|e| format!("--{e}"))?;
         if self.every == 0 {
             return Err("--every 0: expected at least 1".into());
         }
         frames.step = self.every;
-        let sequence = crate::sequence::dataset::open(argument)?;
+        Ok(frames)
+    }
+
+    /// The 0-based frames of n; None for all of them.
+    fn indices(
+        &self,
+        argument: &str,
+        frames: Frames,
+        n: usize,
+    ) -> Result<Option<Vec<usize>>, Failure> {
         if self.frames == ".." && self.every == 1 {
-            return Ok(sequence);
+            return Ok(None);
         }
-        let indices = frames
-            .indices(sequence.frame_count())
-            .map_err(|e| format!("{argument}: --{e}"))?;
-        Ok(sequence.select(&indices)?)
+        let indices = frames.indices(n);
+        Ok(Some(indices.map_err(|e| format!("{argument}: --{e}"))?))
     }
 }
 

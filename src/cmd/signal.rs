@@ -2,11 +2,13 @@
 
 mod design;
 mod edit;
+mod info;
 mod leave_out;
 mod result;
 mod sample;
 mod tables;
 mod transfer;
+mod windows;
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +24,7 @@ use crate::sequence::Sequence;
 use crate::shape::{Space, SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, save};
-use crate::signal::fit::{FitError, FitOptions, fit};
+use crate::signal::fit::{Fit, FitError, FitOptions, fit};
 use crate::signal::in_space::{
     SpaceFit, fit_in_space, fit_in_space_to_rms, fit_in_space_to_rms_refined, refine_in_space,
 };
@@ -32,14 +34,23 @@ use crate::signal::pins::{Pin, validate_pins};
 use crate::signal::refine::tolerance::fit_to_error_refined;
 use crate::signal::refine::{self, RefineOptions, Refinement};
 use crate::signal::saddles::{Place, places};
+use crate::signal::windows_fit::frame_spread;
+
+const EXAMPLES: &str = "Examples:
+  meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json
+  meshseq signal fit @roam-small:300 --tolerance 0.01 --window 120 --overlap 16 -o roam.npz
+
+--window fits as few windows as hold N frames each, one after another, and joins them smoothly: for
+sequences that are long, or larger than memory. `signal sample` and `signal info` read what it writes.";
 
 #[derive(Subcommand)]
 pub enum Signal {
     /// Fit time, pose and shape signals to a sequence
-    #[command(
-        after_help = "Example: meshseq signal fit @gallop-small --k 16 --l 12 --m 7 --knots literal -o gallop.npz --json fit.json"
-    )]
+    #[command(after_help = EXAMPLES)]
     Fit(FitVerb),
+    /// What a representation is: frames, mesh, space, and k, l and m of every window
+    #[command(after_help = info::EXAMPLES)]
+    Info(info::InfoVerb),
     /// Fit every second frame and predict the others
     #[command(after_help = leave_out::EXAMPLES)]
     LeaveOut(leave_out::LeaveOutVerb),
@@ -61,6 +72,7 @@ impl Signal {
     pub fn run(self) -> Outcome {
         match self {
             Self::Fit(verb) => verb.run(),
+            Self::Info(verb) => verb.run(),
             Self::Sample(verb) => verb.run(),
             Self::LeaveOut(verb) => verb.run(),
             Self::Edit(verb) => verb.run(),
@@ -88,7 +100,7 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// Shape space: vertex, gradient, lric or patch
+    /// Shape space: vertex, gradient, lric, lengths or patch
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given
@@ -110,6 +122,12 @@ pub struct FitVerb {
     /// With --refine: weight of the frames half-way between frames, beside 1 for a frame
     #[arg(long, value_name = "W", default_value_t = RefineOptions::default().between, requires = "refine", allow_negative_numbers = true)]
     between: f64,
+    /// Fit windows of at most N frames, 6 or more, one after another: memory does not grow with the sequence
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole("6 or more"))]
+    window: Option<usize>,
+    /// With --window: frames that neighbouring windows have in common, 2 to a third of N; an eighth of N if not given
+    #[arg(long, value_name = "M", requires = "window", allow_negative_numbers = true, value_parser = whole("2 to a third of the window"))]
+    overlap: Option<usize>,
     /// Write the representation to this .npz
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -118,14 +136,67 @@ pub struct FitVerb {
     json: Option<PathBuf>,
 }
 
+/// How to fit, whatever to.
+#[derive(Clone, Copy)]
+struct How {
+    knots: KnotRule,
+    space: SpaceKind,
+    layout: Layout,
+}
+
+/// The error that --tolerance allows: so many frames may each be off by its share of `size`.
+#[derive(Clone, Copy)]
+struct Allowed {
+    size: f64,
+    frames: f64,
+}
+
+impl Allowed {
+    /// For a whole sequence.
+    fn of(sequence: &Sequence) -> Self {
+        Self {
+            size: bounds(sequence.frame(0)).diagonal(),
+            frames: sequence.frame_count() as f64,
+        }
+    }
+
+    /// The error (2) of V vertices at which the relative RMS is `relative`.
+    fn error(&self, relative: f64, vertices: usize) -> f64 {
+        let allowed = (relative * self.size).powi(2) * (self.frames * vertices as f64);
+        // So small a tolerance, or a first frame of no size, leaves no error but 0.
+        allowed.clamp(f64::MIN_POSITIVE, f64::MAX)
+    }
+
+    /// The RMS over n frames at which the relative RMS is `relative`.
+    fn rms(&self, relative: f64, n: usize) -> f64 {
+        let rms = relative * self.size * (self.frames / n as f64).sqrt();
+        rms.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// A sequence or a window of one, fitted in some space.
+struct Fitted {
+    found: SpaceFit,
+    refinement: Option<Refinement>,
+    patches: Vec<i64>,
+}
+
+impl Fitted {
+    fn stored(self, sequence: &Sequence, space: SpaceKind, reference: Vec<f64>) -> Stored {
+        Stored {
+            representation: self.found.fit.representation,
+            positions: self.found.fit.positions,
+            connectivity: sequence.connectivity().clone(),
+            space,
+            reference,
+            patches: self.patches,
+        }
+    }
+}
+
 impl FitVerb {
     pub fn run(self) -> Outcome {
-        let knots: KnotRule = self
-            .knots
-            .parse()
-            .map_err(|e| format!("{e}, found `{}`", self.knots))?;
-        let space: SpaceKind = self.space.parse()?;
-        let layout: Layout = self.layout.parse()?;
+        let how = self.how()?;
         if let Some(out) = &self.out {
             check_representation_place(out)?;
         }
@@ -134,42 +205,40 @@ impl FitVerb {
             return Err(FitError::BadTolerance { value }.into());
         }
         check_between(self.between)?;
+        if let Some(window) = self.window {
+            return windows::run(&self, window, how);
+        }
         let sequence = self.frames.open(&self.sequence)?;
         let pins = match &self.pins {
             Some(path) => read_pins(path, sequence.frame_count())?,
             None => Vec::new(),
         };
-        let reference = self.reference(&sequence, space)?;
-        let (mesh, frames) = (sequence.connectivity(), sequence.positions());
-        let patches = patches_for(space, mesh, &reference, frames)?;
-        let prepared = match space {
-            SpaceKind::Vertex => None,
-            _ => Some(prepare(space, mesh.clone(), &reference, &patches)?),
-        };
-        let (fitted, refinement) = self.fit(&sequence, prepared.as_deref(), knots, layout, pins)?;
-        let mut numbers = numbers(&sequence, &fitted, space, knots, layout);
-        if let Some(told) = &refinement {
+        let reference = self.reference(&sequence, how.space)?;
+        let fitted = self.fit(&sequence, &reference, how, pins, Allowed::of(&sequence))?;
+        let mut numbers = numbers(&sequence, &fitted.found, how);
+        if let Some(told) = &fitted.refinement {
             numbers["refine"] = refine_numbers(told);
         }
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
         if let Some(out) = &self.out {
-            let stored = Stored {
-                representation: fitted.fit.representation,
-                positions: fitted.fit.positions,
-                connectivity: sequence.connectivity().clone(),
-                space,
-                reference,
-                patches,
-            };
-            save(&stored, out)?;
+            save(&fitted.stored(&sequence, how.space, reference), out)?;
         }
         if let Some(json) = json {
             json.keep()?;
         }
         say(&describe(&self.sequence, &numbers));
         Ok(true)
+    }
+
+    fn how(&self) -> Result<How, Failure> {
+        let knots = self.knots.parse();
+        Ok(How {
+            knots: knots.map_err(|e| format!("{e}, found `{}`", self.knots))?,
+            space: self.space.parse()?,
+            layout: self.layout.parse()?,
+        })
     }
 
     /// The reference frame that is asked for; none in vertex space.
@@ -200,11 +269,34 @@ impl FitVerb {
     fn fit(
         &self,
         sequence: &Sequence,
-        space: Option<&dyn Space>,
-        knots: KnotRule,
-        layout: Layout,
+        reference: &[f64],
+        how: How,
         pins: Vec<Pin>,
+        allowed: Allowed,
+    ) -> Result<Fitted, Failure> {
+        let (mesh, frames) = (sequence.connectivity(), sequence.positions());
+        let patches = patches_for(how.space, mesh, reference, frames)?;
+        let space = match how.space {
+            SpaceKind::Vertex => None,
+            kind => Some(prepare(kind, mesh.clone(), reference, &patches)?),
+        };
+        let (found, refinement) = self.fit_in(sequence, space.as_deref(), how, pins, allowed)?;
+        Ok(Fitted {
+            found,
+            refinement,
+            patches,
+        })
+    }
+
+    fn fit_in(
+        &self,
+        sequence: &Sequence,
+        space: Option<&dyn Space>,
+        how: How,
+        pins: Vec<Pin>,
+        allowed: Allowed,
     ) -> Result<(SpaceFit, Option<Refinement>), Failure> {
+        let How { knots, layout, .. } = how;
         let refine = self.refine.then(|| RefineOptions {
             between: self.between,
             ..RefineOptions::default()
@@ -222,10 +314,10 @@ impl FitVerb {
         };
         let tolerance = self.tolerance.unwrap_or(f64::NAN);
         let frames = sequence.positions();
+        let (d, n) = (sequence.dimension(), sequence.frame_count());
         let Some(space) = space else {
-            let (d, n) = (sequence.dimension(), sequence.frame_count());
             let frames = MatRef::from_column_major_slice(frames, d, n);
-            let most = allowed_error(sequence, tolerance);
+            let most = allowed.error(tolerance, d / 3);
             let (fit, told) = match (&constants, &refine) {
                 (Some(options), None) => (fit(frames, options)?, None),
                 (Some(options), Some(how)) => {
@@ -239,8 +331,7 @@ impl FitVerb {
             let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
             return Ok((SpaceFit { fit, rms }, told));
         };
-        let size = bounds(sequence.frame(0)).diagonal();
-        let rms = (tolerance * size).max(f64::MIN_POSITIVE);
+        let rms = allowed.rms(tolerance, n);
         Ok(match (&constants, &refine) {
             (Some(options), None) => (fit_in_space(space, frames, options)?, None),
             (Some(options), Some(how)) => {
@@ -277,23 +368,8 @@ fn refine_numbers(told: &Refinement) -> serde_json::Value {
     })
 }
 
-/// The error (2) at which the relative RMS is `relative`.
-fn allowed_error(sequence: &Sequence, relative: f64) -> f64 {
-    let size = bounds(sequence.frame(0)).diagonal();
-    let vertices = sequence.frame_count() * sequence.connectivity().vertex_count();
-    let allowed = (relative * size).powi(2) * vertices as f64;
-    // So small a tolerance, or a first frame of no size, leaves no error but 0.
-    allowed.clamp(f64::MIN_POSITIVE, f64::MAX)
-}
-
 /// Everything that `--json` holds.
-fn numbers(
-    sequence: &Sequence,
-    found: &SpaceFit,
-    space: SpaceKind,
-    knots: KnotRule,
-    layout: Layout,
-) -> serde_json::Value {
+fn numbers(sequence: &Sequence, found: &SpaceFit, how: How) -> serde_json::Value {
     let fit = &found.fit;
     let (k, l, m) = fit.klm();
     let (n, vertices) = (
@@ -303,26 +379,30 @@ fn numbers(
     let distance = found.rms * ((n * vertices) as f64).sqrt();
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
     let t = fit.timings;
-    let astray: Vec<_> = places(fit)
-        .into_iter()
-        .filter(Place::is_astray)
-        .map(|p| json!({"time": p.time, "stray": p.stray, "curvature": p.curvature}))
-        .collect();
     json!({
         "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "V": vertices, "F": sequence.connectivity().faces().len(),
-        "space": space.name(), "knots": knots.to_string(),
-        "layout": layout.to_string(), "layout_weight": fit.layout_weight,
+        "space": how.space.name(), "knots": how.knots.to_string(),
+        "layout": how.layout.to_string(), "layout_weight": fit.layout_weight,
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
         "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
         "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
-        "astray": astray,
+        "astray": astray(fit, 0),
         "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
         "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
     })
+}
+
+/// The in-betweens that go astray, in frame times of the sequence in which `before` frames come before those of the fit.
+fn astray(fit: &Fit, before: usize) -> Vec<serde_json::Value> {
+    let places = places(fit).into_iter().filter(Place::is_astray);
+    let time = |p: &Place| p.time + before as f64;
+    places
+        .map(|p| json!({"time": time(&p), "stray": p.stray, "curvature": p.curvature}))
+        .collect()
 }
 
 fn ratio(value: f64, scale: f64) -> f64 {
@@ -331,15 +411,6 @@ fn ratio(value: f64, scale: f64) -> f64 {
 
 /// ||A - E(A)|| of Karni & Gotsman 2004: E(A) puts every vertex at the mean vertex of its frame.
 fn spread(sequence: &Sequence) -> f64 {
-    let frame_spread = |frame: &[f64]| -> f64 {
-        (0..3)
-            .map(|axis| {
-                let values = || frame.iter().skip(axis).step_by(3);
-                let mean = values().sum::<f64>() / (frame.len() / 3) as f64;
-                values().map(|x| (x - mean).powi(2)).sum::<f64>()
-            })
-            .sum()
-    };
     let frames = sequence.positions().chunks(sequence.dimension());
     frames.map(frame_spread).sum::<f64>().sqrt()
 }

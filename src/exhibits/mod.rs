@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`gallop`], [`control`], [`saddle`], [`flag`] | Figures 1 to 4 |
 //! | [`editing`], [`resampling`], [`transfer`], [`expressions`] | Figures 5 to 8 |
+//! | [`round_trip`] | every frame through every shape space and back (section 5) |
 //! | [`large_turns`] | halfway to a roll by up to 700 degrees, in every shape space (section 5) |
 //! | [`leave_out`] | in-betweens by layout, staged and refined (section 6) |
 //! | [`signals`] | curves and frames that several of them show |
@@ -18,6 +19,7 @@ pub mod large_turns;
 pub mod leave_out;
 pub mod render;
 pub mod resampling;
+pub mod round_trip;
 pub mod saddle;
 pub mod signals;
 pub mod transfer;
@@ -150,6 +152,7 @@ pub const ALL: &[(&str, Make)] = &[
     ("figure-6", resampling::exhibit),
     ("figure-7", transfer::exhibit),
     ("figure-8", expressions::exhibit),
+    ("round-trip", round_trip::exhibit),
     ("large-turns", large_turns::exhibit),
     ("leave-out", leave_out::exhibit),
 ];

@@ -52,6 +52,17 @@ pub enum SequenceError {
     },
 }
 
+/// The first coordinate that is not finite, in frames of d numbers each of which the first is number `from` (0-based).
+fn first_not_finite(positions: &[f64], d: usize, from: usize) -> Option<SequenceError> {
+    let at = positions.iter().position(|x| !x.is_finite())?;
+    Some(SequenceError::NotFinite {
+        frame: from + at / d + 1,
+        vertex: at % d / 3,
+        axis: ['x', 'y', 'z'][at % 3],
+        value: positions[at],
+    })
+}
+
 impl Sequence {
     /// Takes n x 3V positions, frame-major. Costs one pass to see that all are finite.
     pub fn new(
@@ -75,13 +86,8 @@ impl Sequence {
                 found: positions.len(),
             });
         }
-        if let Some(at) = positions.iter().position(|x| !x.is_finite()) {
-            return Err(SequenceError::NotFinite {
-                frame: at / (vertices * 3) + 1,
-                vertex: at / 3 % vertices,
-                axis: ['x', 'y', 'z'][at % 3],
-                value: positions[at],
-            });
+        if let Some(wrong) = first_not_finite(&positions, vertices * 3, 0) {
+            return Err(wrong);
         }
         Ok(Self {
             connectivity,

@@ -26,6 +26,7 @@ use super::f::{Spline, SplineError};
 use super::g::PoseSignal;
 use super::in_space::sample_in_space;
 use super::psi::{Representation, TimeSignal};
+use super::windows::PlanError;
 use crate::arrays::{Array, ArrayError, Bundle};
 use crate::mesh::{Connectivity, ConnectivityError};
 use crate::sequence::format::{FormatError, npz};
@@ -33,8 +34,10 @@ use crate::shape::reference::check_len;
 use crate::shape::{ShapeError, Space, SpaceKind, UnknownSpace, prepare};
 
 /// Frames whose vectors in the shape space are held at a time, for they are several times as long as positions.
-const AT_A_TIME: usize = 32;
+pub const AT_A_TIME: usize = 32;
 const FORMAT: &str = "meshseq signal 1";
+/// The format of [`super::windows_file`].
+pub(super) const WINDOWS_FORMAT: &str = "meshseq signal windows 1";
 
 /// A representation and the mesh it deforms.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,18 +58,30 @@ impl Stored {
     /// Frames of V vertices at these times, n x 3V positions. Factors the space's systems; [`ShapeError::WrongLength`] where the representation is of
     /// another mesh than its reference.
     pub fn sample(&self, times: &[f64]) -> Result<Vec<f64>, ShapeError> {
-        if self.space == SpaceKind::Vertex {
+        self.sample_in(self.prepare()?.as_deref(), times)
+    }
+
+    /// The same with what [`Self::prepare`] gave, for many calls.
+    pub fn sample_in(
+        &self,
+        space: Option<&dyn Space>,
+        times: &[f64],
+    ) -> Result<Vec<f64>, ShapeError> {
+        let Some(space) = space else {
             return Ok(self.representation.evaluate(times));
-        }
-        let space = self.prepare()?;
+        };
         let mut frames = Vec::with_capacity(times.len() * space.frame_len());
         for some in times.chunks(AT_A_TIME) {
-            frames.extend(sample_in_space(&*space, &self.representation, some)?);
+            frames.extend(sample_in_space(space, &self.representation, some)?);
         }
         Ok(frames)
     }
 
-    fn prepare(&self) -> Result<Box<dyn Space>, ShapeError> {
+    /// The shape space with its factors; None for vertex space, which has none.
+    pub fn prepare(&self) -> Result<Option<Box<dyn Space>>, ShapeError> {
+        if self.space == SpaceKind::Vertex {
+            return Ok(None);
+        }
         let connectivity = self.connectivity.clone();
         let space = prepare(self.space, connectivity, &self.reference, &self.patches)?;
         check_len(
@@ -74,7 +89,7 @@ impl Stored {
             &self.representation.offset,
             space.dimension(),
         )?;
-        Ok(space)
+        Ok(Some(space))
     }
 }
 
@@ -96,6 +111,14 @@ pub enum RepresentationError {
     /// See [`SplineError`].
     #[error("{path}: `u` and `control` are no time signal: {source}")]
     Spline { path: String, source: SplineError },
+    /// A file of windows where one representation of all frames is needed.
+    #[error(
+        "{path}: a representation in windows, which `meshseq signal sample` and `info` read; fit the sequence without --window for this"
+    )]
+    InWindows { path: String },
+    /// See [`PlanError`].
+    #[error("{path}: {source}; expected windows as `meshseq signal fit --window` writes them")]
+    Plan { path: String, source: PlanError },
     /// Arrays that do not fit together.
     #[error("{path}: {what}; expected a representation as `meshseq signal fit` writes it")]
     Inconsistent { path: String, what: String },
@@ -103,9 +126,22 @@ pub enum RepresentationError {
 
 /// Writes the representation; the file appears whole or not at all.
 pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
+    let mut arrays = own_arrays(stored);
+    arrays.push(("F", Array::triangles(stored.connectivity.faces())));
+    arrays.push(("meta", Array::Text(meta(FORMAT, stored.space))));
+    if stored.space != SpaceKind::Vertex {
+        arrays.push(("reference", Array::vertices(&stored.reference)));
+    }
+    if stored.space == SpaceKind::Patch {
+        arrays.push(("patches", Array::integers(&stored.patches)));
+    }
+    Ok(npz::write_arrays(path, &arrays)?)
+}
+
+/// The signals and where the frames are, which every window of a long sequence has of its own.
+pub(super) fn own_arrays(stored: &Stored) -> Vec<(&'static str, Array)> {
     let r = &stored.representation;
-    let meta = serde_json::json!({"format": FORMAT, "space": stored.space.name()}).to_string();
-    let mut arrays = vec![
+    vec![
         ("h0", Array::vector(&r.offset)),
         ("H", Array::columns(r.basis.as_ref())),
         ("g", Array::columns(r.pose.coefficients.as_ref())),
@@ -114,55 +150,81 @@ pub fn save(stored: &Stored, path: &Path) -> Result<(), RepresentationError> {
         ("u", Array::vector(&r.time.spline.knots)),
         ("t", Array::vector(&r.time.parameters)),
         ("p", Array::points(&stored.positions)),
-        ("F", Array::triangles(stored.connectivity.faces())),
-        ("meta", Array::Text(meta)),
-    ];
-    if stored.space != SpaceKind::Vertex {
-        let shape = vec![stored.reference.len() / 3, 3];
-        let data = stored.reference.clone();
-        arrays.push(("reference", Array::F64 { shape, data }));
-    }
-    if stored.space == SpaceKind::Patch {
-        arrays.push(("patches", Array::integers(&stored.patches)));
-    }
-    Ok(npz::write_arrays(path, &arrays)?)
+    ]
+}
+
+/// The names of [`own_arrays`].
+pub(super) const OWN: [&str; 8] = ["h0", "H", "g", "sites", "control", "u", "t", "p"];
+
+pub(super) fn meta(format: &str, space: SpaceKind) -> String {
+    serde_json::json!({"format": format, "space": space.name()}).to_string()
 }
 
 /// Reads a representation back.
 pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
-    let bundle = Bundle(npz::read_arrays(path)?.into_iter().collect());
     let place = path.display().to_string();
-    let stored = read(&bundle).map_err(|source| RepresentationError::Arrays {
-        path: place.clone(),
-        source,
-    })?;
-    let faces = bundle
-        .triangles("F")
-        .map_err(|source| RepresentationError::Arrays {
-            path: place.clone(),
-            source,
-        })?;
-    let (representation, positions, meta) = stored;
-    let what = mismatch(&representation, &positions)
-        .or_else(|| foreign(&meta).err())
-        .or_else(|| {
-            bundle
-                .first_not_finite()
-                .map(|found| format!("{found} is not finite"))
-        });
-    if let Some(what) = what {
-        return Err(RepresentationError::Inconsistent { path: place, what });
+    let bundle = Bundle(npz::read_arrays(path)?.into_iter().collect());
+    let text = bundle.text("meta").map_err(|e| arrays(&place, e))?;
+    if named_format(text) == Some(WINDOWS_FORMAT) {
+        return Err(RepresentationError::InWindows { path: place });
     }
-    let spline = representation.time.spline.check();
-    spline.map_err(|source| RepresentationError::Spline {
-        path: place.clone(),
-        source,
-    })?;
-    let space = foreign(&meta).unwrap_or(SpaceKind::Vertex);
-    let arrays = |source| RepresentationError::Arrays {
-        path: place.clone(),
-        source,
+    let space = space_of(text, FORMAT).map_err(|what| inconsistent(&place, what))?;
+    let (representation, positions) = own(&bundle, &place)?;
+    let (reference, patches) = over(&bundle, space, &place)?;
+    let numbers = match space {
+        SpaceKind::Vertex => representation.dimension(),
+        _ => reference.len(),
     };
+    let connectivity = mesh(&bundle, numbers, &place)?;
+    Ok(Stored {
+        representation,
+        positions,
+        connectivity,
+        space,
+        reference,
+        patches,
+    })
+}
+
+fn arrays(place: &str, source: ArrayError) -> RepresentationError {
+    let path = place.to_owned();
+    RepresentationError::Arrays { path, source }
+}
+
+pub(super) fn inconsistent(place: &str, what: String) -> RepresentationError {
+    let path = place.to_owned();
+    RepresentationError::Inconsistent { path, what }
+}
+
+/// The arrays of [`own_arrays`] back; every number of the bundle is finite then.
+pub(super) fn own(
+    bundle: &Bundle,
+    place: &str,
+) -> Result<(Representation, Vec<Point>), RepresentationError> {
+    let (representation, positions) = signals(bundle).map_err(|e| arrays(place, e))?;
+    let not_finite = || {
+        let found = bundle.first_not_finite()?;
+        Some(format!("{found} is not finite"))
+    };
+    if let Some(what) = mismatch(&representation, &positions).or_else(not_finite) {
+        return Err(inconsistent(place, what));
+    }
+    match representation.time.spline.check() {
+        Ok(()) => Ok((representation, positions)),
+        Err(source) => Err(RepresentationError::Spline {
+            path: place.to_owned(),
+            source,
+        }),
+    }
+}
+
+/// The reference frame and patches that a space needs.
+pub(super) fn over(
+    bundle: &Bundle,
+    space: SpaceKind,
+    place: &str,
+) -> Result<(Vec<f64>, Vec<i64>), RepresentationError> {
+    let arrays = |source| arrays(place, source);
     let reference = match space {
         SpaceKind::Vertex => Vec::new(),
         _ => bundle.f64("reference", 2).map_err(arrays)?.1.to_vec(),
@@ -171,30 +233,30 @@ pub fn load(path: &Path) -> Result<Stored, RepresentationError> {
         SpaceKind::Patch => bundle.integers("patches").map_err(arrays)?.to_vec(),
         _ => Vec::new(),
     };
-    let numbers = match space {
-        SpaceKind::Vertex => representation.dimension(),
-        _ => reference.len(),
-    };
-    if numbers % 3 != 0 {
-        let what = format!("{numbers} coordinates are no whole number of vertices");
-        return Err(RepresentationError::Inconsistent { path: place, what });
-    }
-    let connectivity = Connectivity::new(numbers / 3, faces);
-    let connectivity = connectivity.map_err(|source| RepresentationError::Connectivity {
-        path: place,
-        source,
-    })?;
-    Ok(Stored {
-        representation,
-        positions,
-        connectivity: Arc::new(connectivity),
-        space,
-        reference,
-        patches,
-    })
+    Ok((reference, patches))
 }
 
-fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>, String), ArrayError> {
+/// The mesh of frames of so many coordinates.
+pub(super) fn mesh(
+    bundle: &Bundle,
+    numbers: usize,
+    place: &str,
+) -> Result<Arc<Connectivity>, RepresentationError> {
+    let faces = bundle.triangles("F").map_err(|e| arrays(place, e))?;
+    if !numbers.is_multiple_of(3) {
+        let what = format!("{numbers} coordinates are no whole number of vertices");
+        return Err(inconsistent(place, what));
+    }
+    match Connectivity::new(numbers / 3, faces) {
+        Ok(connectivity) => Ok(Arc::new(connectivity)),
+        Err(source) => Err(RepresentationError::Connectivity {
+            path: place.to_owned(),
+            source,
+        }),
+    }
+}
+
+fn signals(bundle: &Bundle) -> Result<(Representation, Vec<Point>), ArrayError> {
     let spline = Spline {
         control: bundle.points("control")?,
         knots: bundle.vector("u")?.to_vec(),
@@ -208,11 +270,7 @@ fn read(bundle: &Bundle) -> Result<(Representation, Vec<Point>, String), ArrayEr
         offset: bundle.vector("h0")?.to_vec(),
         basis: transposed(bundle, "H")?,
     };
-    Ok((
-        representation,
-        bundle.points("p")?,
-        bundle.text("meta")?.to_owned(),
-    ))
+    Ok((representation, bundle.points("p")?))
 }
 
 fn transposed(bundle: &Bundle, name: &str) -> Result<Mat<f64>, ArrayError> {
@@ -250,12 +308,19 @@ fn mismatch(r: &Representation, positions: &[Point]) -> Option<String> {
     Some(format!("`t` falls at {falls} (0-based)"))
 }
 
-/// The space that `meta` names, or what is wrong with it.
-fn foreign(meta: &str) -> Result<SpaceKind, String> {
+/// The format that `meta` names, where this program writes it.
+pub(super) fn named_format(meta: &str) -> Option<&'static str> {
     let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
-    if meta["format"] != FORMAT {
+    let ours = [FORMAT, WINDOWS_FORMAT];
+    ours.into_iter().find(|format| meta["format"] == *format)
+}
+
+/// The space that `meta` names beside this format, or what is wrong with it.
+pub(super) fn space_of(meta: &str, format: &str) -> Result<SpaceKind, String> {
+    let meta: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
+    if meta["format"] != format {
         return Err(format!(
-            "`meta` has the format {}, expected \"{FORMAT}\"",
+            "`meta` has the format {}, expected \"{format}\"",
             meta["format"]
         ));
     }

@@ -157,12 +157,7 @@ pub struct Fit {
 impl Fit {
     /// k, l and m as used: m is cut to the rank, l to the poses that are apart, k to two more than the distinct parameters.
     pub fn klm(&self) -> (usize, usize, usize) {
-        let r = &self.representation;
-        (
-            r.time.spline.control.len(),
-            r.pose.site_count(),
-            r.basis.ncols(),
-        )
+        self.representation.klm()
     }
 }
 

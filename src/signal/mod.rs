@@ -19,6 +19,7 @@
 //! | 4.4 poses placed by hand, a sketched curve | [`design`], [`sketch`] |
 //! | 6 a layout that needs no pins | [`layout`] |
 //! | 6 in-betweens: saddles, the leave-out test, what frames tell of them | [`saddles`], [`leave_out`], [`cubic`] |
+//! | 6 long sequences: windows that are joined smoothly | [`windows`], [`windows_fit`]; in files [`windows_file`] |
 //! | 5 signals in another shape space | [`in_space`], and [`crate::shape`] for the spaces |
 //!
 //! Frames are columns: shapes Z are d x n, coordinates X are m x n. Points of the pose plane are `[f64; 2]`. Where the paper is silent or its
@@ -55,6 +56,9 @@ pub mod sketch;
 mod strand;
 pub mod thin_plate;
 pub mod transfer;
+pub mod windows;
+pub mod windows_file;
+pub mod windows_fit;
 
 /// A point of the pose plane.
 pub type Point = [f64; 2];

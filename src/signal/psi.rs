@@ -63,6 +63,15 @@ pub struct Representation {
 }
 
 impl Representation {
+    /// k, l and m: control points, sites, dimension of the shape subspace.
+    pub fn klm(&self) -> (usize, usize, usize) {
+        (
+            self.time.spline.control.len(),
+            self.pose.site_count(),
+            self.basis.ncols(),
+        )
+    }
+
     /// d, the numbers in a frame.
     pub fn dimension(&self) -> usize {
         self.offset.len()
@@ -114,8 +123,7 @@ impl Representation {
     /// How many numbers the representation stores: signals, knots and parameters.
     pub fn stored_numbers(&self) -> usize {
         let (d, m) = self.basis.shape();
-        let l = self.pose.site_count();
-        let k = self.time.spline.control.len();
+        let (k, l, _) = self.klm();
         d * (m + 1) + m * (l + 3) + 2 * l + 2 * k + (k + 2) + self.time.frame_count()
     }
 }

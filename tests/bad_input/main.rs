@@ -10,6 +10,7 @@ mod pins;
 mod representations;
 mod sequences;
 mod verbs;
+mod windows;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -9,15 +9,18 @@ use super::super::output::{check_place, draft_json, say};
 use super::super::{Failure, Outcome, whole};
 use super::tables::{numbers, pairs, read_text};
 use crate::sequence::Sequence;
-use crate::sequence::format::write;
-use crate::signal::file::{Stored, load};
+use crate::sequence::format::{FormatError, FrameWriter};
+use crate::signal::file::{AT_A_TIME, Stored};
 use crate::signal::resample::{at_rate, check, evenly, warped};
+use crate::signal::windows_file::WindowsFile;
 
 pub const EXAMPLES: &str = "Examples:
   meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
   meshseq signal sample gallop.npz --rate 1.5 -o half-again-as-many
   printf 'frame,time\\n1,1\\n30,12\\n36,24\\n' > slow-then-fast.csv
-  meshseq signal sample gallop.npz --warp slow-then-fast.csv -o warped.npz";
+  meshseq signal sample gallop.npz --warp slow-then-fast.csv -o warped.npz
+  meshseq signal fit @roam-small:200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
+  meshseq signal sample roam.npz --rate 2 -o twice-as-many.pc2";
 
 #[derive(Args)]
 pub struct SampleVerb {
@@ -51,22 +54,38 @@ pub struct SampleVerb {
 impl SampleVerb {
     pub fn run(self) -> Outcome {
         self.json.as_deref().map_or(Ok(()), check_place)?;
-        let stored = load(&self.representation)?;
-        let times = self.times(stored.representation.time.frame_count())?;
-        let sequence = frames_at(&stored, &times, &self.representation)?;
+        let mut file = WindowsFile::open(&self.representation)?;
+        let n = file.plan().frame_count();
+        let times = self.times(n)?;
+        let mesh = file.connectivity().clone();
         let numbers = json!({
-            "n": stored.representation.time.frame_count(), "frames": times.len(), "times": times,
-            "V": sequence.connectivity().vertex_count(), "F": sequence.connectivity().faces().len(),
-            "space": stored.space.name(),
+            "n": n, "frames": times.len(), "times": times,
+            "V": mesh.vertex_count(), "F": mesh.faces().len(),
+            "space": file.space().name(),
         });
+        let mut writer = FrameWriter::create(&self.out, &mesh, times.len())?;
+        for some in times.chunks(AT_A_TIME) {
+            let frames = file.sample(some)?;
+            writer.push(&frames).map_err(|e| self.sampled(e))?;
+        }
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
-        write(&sequence, &self.out)?;
+        writer.finish()?;
         if let Some(json) = json {
             json.keep()?;
         }
         say(&format!("{}: {} frames", self.out.display(), times.len()));
         Ok(true)
+    }
+
+    /// Frames that are none are the fault of the representation.
+    fn sampled(&self, error: FormatError) -> Failure {
+        match error {
+            FormatError::Sequence { source, .. } => {
+                format!("{}: sampled, {source}", self.representation.display()).into()
+            }
+            other => other.into(),
+        }
     }
 
     fn times(&self, n: usize) -> Result<Vec<f64>, Failure> {

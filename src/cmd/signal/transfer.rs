@@ -47,7 +47,7 @@ pub struct TransferVerb {
         allow_hyphen_values = true
     )]
     example_frames: String,
-    /// Shape space of both meshes: vertex, gradient, lric or patch; that of the representation if not given, vertex for a sequence
+    /// Shape space of both meshes: vertex, gradient, lric, lengths or patch; that of the representation if not given, vertex for a sequence
     #[arg(long, value_name = "SPACE")]
     space: Option<String>,
     /// Control points of the time signal of a sequence, 4 to n + 2; n + 2 if not given
@@ -280,5 +280,6 @@ fn chosen(ranges: &str, count: usize) -> Result<Vec<usize>, Failure> {
 /// Whether a file holds a representation, and not a sequence or nothing that can be read.
 fn is_representation(path: &Path) -> bool {
     let npz = path.extension().is_some_and(|e| e == "npz") && path.is_file();
-    npz && npz::Archive::open(path).is_ok_and(|archive| archive.names().any(|name| name == "h0"))
+    let ours = |name: &str| ["h0", "windows"].contains(&name);
+    npz && npz::Archive::open(path).is_ok_and(|archive| archive.names().any(ours))
 }

@@ -1,7 +1,7 @@
 //! Bytes in from a file whose size is known first, bytes out to a file or folder that appears whole or not at all.
 
 use std::fs::{self, File, Permissions};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::FormatError;
@@ -45,79 +45,129 @@ pub(super) fn read_into(path: &Path, buffer: &mut Vec<u8>) -> Result<(), FormatE
 
 /// A file written under a temporary name beside its destination; dropping it removes it.
 pub(super) struct Draft {
-    file: tempfile::NamedTempFile,
+    out: BufWriter<tempfile::NamedTempFile>,
     path: PathBuf,
 }
 
 impl Draft {
-    /// Writes what `fill` writes. `path` is where it is to go in the end.
-    pub(super) fn write(
-        path: &Path,
-        fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
-    ) -> Result<Self, FormatError> {
-        let failed = |e| FormatError::writing(path, e);
+    /// An empty one. `path` is where it is to go in the end.
+    pub(super) fn create(path: &Path) -> Result<Self, FormatError> {
         if path.exists() && !path.is_file() {
             return Err(FormatError::NotAFile {
                 path: path.to_path_buf(),
             });
         }
         let parent = parent_of(path)?;
-        let mut file = temporary(0o666).tempfile_in(parent).map_err(failed)?;
-        let mut writer = BufWriter::with_capacity(1 << 16, file.as_file_mut());
-        let filled = fill(&mut writer).and_then(|()| writer.flush());
-        // Unwritten bytes of a failed draft are dropped with it, not tried again.
-        let _ = writer.into_parts();
-        filled.map_err(failed)?;
+        let file = temporary(0o666).tempfile_in(parent);
+        let file = file.map_err(|e| FormatError::writing(path, e))?;
         Ok(Self {
-            file,
+            out: BufWriter::with_capacity(1 << 16, file),
             path: path.to_path_buf(),
         })
     }
 
+    /// Where it is to go in the end.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes what `fill` writes.
+    pub(super) fn write(
+        path: &Path,
+        fill: impl FnOnce(&mut Self) -> io::Result<()>,
+    ) -> Result<Self, FormatError> {
+        let mut draft = Self::create(path)?;
+        let filled = fill(&mut draft).and_then(|()| draft.flush());
+        match filled {
+            Ok(()) => Ok(draft),
+            Err(e) => Err(FormatError::writing(path, e)),
+        }
+    }
+
     /// Moves the draft to its destination, replacing the file that was there.
-    pub(super) fn keep(self) -> Result<(), FormatError> {
-        match self.file.persist(&self.path) {
+    pub(super) fn keep(mut self) -> Result<(), FormatError> {
+        let path = std::mem::take(&mut self.path);
+        let failed = |e| FormatError::writing(&path, e);
+        self.out.flush().map_err(failed)?;
+        // Nothing is left in the buffer.
+        let (file, _) = self.out.into_parts();
+        match file.persist(&path) {
             Ok(_) => Ok(()),
-            Err(e) => Err(FormatError::writing(&self.path, e.error)),
+            Err(e) => Err(failed(e.error)),
         }
     }
 }
 
-/// Writes a file whole or not at all: under a temporary name in the same folder, then renamed.
-pub(super) fn write_file(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
-) -> Result<(), FormatError> {
-    Draft::write(path, fill)?.keep()
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
-/// Writes a folder of frames whole or not at all: `fill` fills a temporary folder beside it, which is then renamed.
-///
-/// A folder that is there already is replaced only when all it holds are OBJ files.
-pub(super) fn write_folder(
-    path: &Path,
-    fill: impl FnOnce(&Path) -> Result<(), FormatError>,
-) -> Result<(), FormatError> {
-    let failed = |e| FormatError::writing(path, e);
-    let there = path.exists();
-    // A link or a path such as `.` is followed to the folder itself, which can be renamed.
-    let target = match there {
-        true => path.canonicalize().map_err(failed)?,
-        false => path.to_path_buf(),
-    };
-    if there {
-        refuse_foreign_folder(&target)?;
+impl Seek for Draft {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
     }
-    let parent = parent_of(&target)?;
-    let draft = temporary(0o777).tempdir_in(&parent).map_err(failed)?;
-    fill(draft.path())?;
-    if there {
-        swap_in(draft.path(), &target, &parent).map_err(failed)?;
-    } else {
-        fs::rename(draft.path(), &target).map_err(failed)?;
+}
+
+/// A folder of frames under a temporary name beside its destination; dropping it removes it and all that it holds.
+pub(super) struct FolderDraft {
+    folder: tempfile::TempDir,
+    path: PathBuf,
+    /// The destination itself, where `path` is a link or a path such as `.`.
+    target: PathBuf,
+    parent: PathBuf,
+}
+
+impl FolderDraft {
+    /// An empty one. A folder that is at `path` already will be replaced, but only when all it holds are OBJ files.
+    pub(super) fn create(path: &Path) -> Result<Self, FormatError> {
+        let failed = |e| FormatError::writing(path, e);
+        let there = path.exists();
+        // A link or a path such as `.` is followed to the folder itself, which can be renamed.
+        let target = match there {
+            true => path.canonicalize().map_err(failed)?,
+            false => path.to_path_buf(),
+        };
+        if there {
+            refuse_foreign_folder(&target)?;
+        }
+        let parent = parent_of(&target)?;
+        let folder = temporary(0o777).tempdir_in(&parent).map_err(failed)?;
+        Ok(Self {
+            folder,
+            path: path.to_path_buf(),
+            target,
+            parent,
+        })
     }
-    let _ = draft.keep();
-    Ok(())
+
+    /// Where it is to go in the end.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The temporary folder, to put files into.
+    pub(super) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Moves the draft to its destination, replacing the folder that was there.
+    pub(super) fn keep(self) -> Result<(), FormatError> {
+        let failed = |e| FormatError::writing(&self.path, e);
+        if self.target.exists() {
+            refuse_foreign_folder(&self.target)?;
+            swap_in(self.folder.path(), &self.target, &self.parent).map_err(failed)?;
+        } else {
+            fs::rename(self.folder.path(), &self.target).map_err(failed)?;
+        }
+        let _ = self.folder.keep();
+        Ok(())
+    }
 }
 
 /// Puts `draft` in the place of `target`, whose contents are deleted once that is done; on failure they are put back.
@@ -178,6 +228,13 @@ fn temporary(mode: u32) -> tempfile::Builder<'static, 'static> {
 mod tests {
     use super::*;
     use std::fs::OpenOptions;
+
+    fn write_file(
+        path: &Path,
+        fill: impl FnOnce(&mut Draft) -> io::Result<()>,
+    ) -> Result<(), FormatError> {
+        Draft::write(path, fill)?.keep()
+    }
 
     /// Takes `room` bytes, then fails as a full disk does.
     struct Limited<W> {
@@ -262,19 +319,10 @@ mod tests {
     fn a_folder_whose_frames_fail_is_not_there() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames");
-        let fail = |draft: &Path| {
-            fs::write(draft.join("0001.obj"), "v 0 0 0").unwrap();
-            Err(FormatError::writing(
-                &path,
-                io::ErrorKind::StorageFull.into(),
-            ))
-        };
         for before in [0, 1] {
-            let error = write_folder(&path, fail);
-            assert!(
-                matches!(error, Err(FormatError::DiskFull { .. })),
-                "{error:?}"
-            );
+            let draft = FolderDraft::create(&path).unwrap();
+            fs::write(draft.folder().join("0001.obj"), "v 0 0 0").unwrap();
+            drop(draft);
             assert_eq!(entries(folder.path()).len(), before);
             fs::create_dir_all(&path).unwrap();
             fs::write(path.join("7.obj"), "v 1 1 1").unwrap();
@@ -306,7 +354,8 @@ mod tests {
         fs::write(folder.path().join("a"), "").unwrap();
         fs::create_dir(folder.path().join("b")).unwrap();
         write_file(&folder.path().join("c"), |_| Ok(())).unwrap();
-        write_folder(&folder.path().join("d"), |_| Ok(())).unwrap();
+        let folder_draft = FolderDraft::create(&folder.path().join("d")).unwrap();
+        folder_draft.keep().unwrap();
         assert_eq!((mode("a"), mode("b")), (mode("c"), mode("d")));
     }
 }

@@ -17,15 +17,19 @@ pub mod npz;
 mod obj;
 mod pc2;
 pub mod peer_tobj;
+pub mod stream;
+mod writer;
 
 use std::path::{Path, PathBuf};
 
+use self::stream::FrameStream;
 use super::Sequence;
 pub use error::FormatError;
 pub use files::frame_files;
 use files::has_extension;
 pub use natural::compare as natural_order;
 pub use obj::ObjProblem;
+pub use writer::FrameWriter;
 
 /// Reads the sequence at `path`; see the table above and [`frame_files`].
 ///
@@ -43,6 +47,23 @@ pub fn read(path: &Path) -> Result<Sequence, FormatError> {
     obj::read(&frame_files(path)?)
 }
 
+/// Opens what [`read`] reads, to be read some frames at a time; see [`FrameStream`].
+///
+/// What is wrong with a frame is told when it is read.
+pub fn stream(path: &Path) -> Result<FrameStream, FormatError> {
+    if !path.is_dir() {
+        if has_extension(path, "npz") {
+            return npz::stream(path);
+        }
+        if has_extension(path, "pc2") {
+            let cache = pc2::Cache::open(path)?;
+            let (connectivity, frames) = (cache.connectivity.clone(), cache.frames);
+            return FrameStream::new(path, connectivity, frames, Box::new(cache));
+        }
+    }
+    obj::stream(path, frame_files(path)?)
+}
+
 /// Reads OBJ files as the frames of one sequence, in this order.
 pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
     obj::read(paths)
@@ -50,7 +71,7 @@ pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
 
 /// Writes `sequence` to `path`, in the format its ending names: `.npz` and OBJ keep every bit, `.pc2` rounds to f32.
 ///
-/// - `.npz`: see [`npz::write`];
+/// - `.npz`: arrays `V` (n, V, 3) of f64 and `F` (F, 3) of int64, 0-based;
 /// - `.pc2`: with the first frame and the faces beside it in the `.obj` of the same stem;
 /// - `.obj`: one file, for a sequence of one frame;
 /// - otherwise a folder of `0001.obj`, `0002.obj`, ... which may exist when all it holds are OBJ files: it is replaced.
@@ -59,35 +80,8 @@ pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
 /// permission leaves what was there before. Existing files of these formats are replaced. The same sequence always
 /// gives the same bytes.
 pub fn write(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
-    if has_extension(path, "npz") {
-        npz::write(sequence, path)
-    } else if has_extension(path, "pc2") {
-        pc2::write(sequence, path)
-    } else if has_extension(path, "obj") {
-        write_single(sequence, path)
-    } else if OTHER_FORMATS.iter().any(|e| has_extension(path, e)) {
-        Err(FormatError::Unsupported {
-            path: path.to_path_buf(),
-        })
-    } else {
-        obj::write_frames(sequence, path)
-    }
-}
-
-/// Endings that ask for something else than a folder of this name.
-const OTHER_FORMATS: [&str; 18] = [
-    "abc", "bin", "csv", "fbx", "glb", "gltf", "html", "json", "mdd", "npy", "off", "ply", "stl",
-    "txt", "usd", "usda", "usdc", "zip",
-];
-
-fn write_single(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
-    match sequence.frame_count() {
-        1 => bytes::write_file(path, |out| obj::write_frame(sequence, 0, out)),
-        frames => Err(FormatError::CannotHold {
-            path: path.to_path_buf(),
-            reason: format!(
-                "an OBJ file holds one frame, this sequence has {frames}; name a folder, a .npz or a .pc2"
-            ),
-        }),
-    }
+    let frames = sequence.frame_count();
+    let mut writer = FrameWriter::create(path, sequence.connectivity(), frames)?;
+    writer.push(sequence.positions())?;
+    writer.finish()
 }

@@ -11,14 +11,16 @@ mod problem;
 mod zip_read;
 mod zip_write;
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::bytes;
+use super::bytes::Draft;
 use super::error::FormatError;
 use crate::arrays::Array;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
+use crate::sequence::format::stream::FrameStream;
 pub use archive::Archive;
 pub use problem::NpzProblem;
 
@@ -65,7 +67,7 @@ pub fn read_arrays(path: &Path) -> Result<Vec<(String, Array)>, FormatError> {
 /// Writes named arrays to one NPZ file that numpy opens without pickle.
 ///
 /// Entries are stored, not packed, and carry no time, so equal arrays give equal bytes. Names must be distinct and not
-/// empty. The file appears whole or not at all. Costs two passes over the data, of which one computes the checksum.
+/// empty. The file appears whole or not at all. Costs one pass over the data.
 pub fn write_arrays(path: &Path, arrays: &[(&str, Array)]) -> Result<(), FormatError> {
     let views: Vec<_> = arrays
         .iter()
@@ -76,36 +78,133 @@ pub fn write_arrays(path: &Path, arrays: &[(&str, Array)]) -> Result<(), FormatE
 
 /// [`write_arrays`] without owning the arrays.
 pub fn write_views(path: &Path, arrays: &[(&str, ArrayView)]) -> Result<(), FormatError> {
-    for (at, (name, array)) in arrays.iter().enumerate() {
-        let repeated = arrays[..at].iter().any(|(other, _)| other == name);
-        if let Some(reason) = obstacle(name, array, repeated) {
-            return Err(refuse(
-                path,
-                NpzProblem::CannotWrite {
-                    array: name.to_string(),
-                    reason,
-                },
-            ));
-        }
+    let mut writer = Writer::create(path)?;
+    for &(name, array) in arrays {
+        writer.add(name, array)?;
     }
-    bytes::write_file(path, |out| {
-        let mut archive = zip_write::Archive::new(out);
-        for (name, array) in arrays {
-            archive.add(&entry(name, *array))?;
-        }
-        archive.finish()
-    })
+    writer.finish()
 }
 
-fn entry<'a>(name: &str, array: ArrayView<'a>) -> zip_write::Entry<'a> {
-    let header = npy::header(&elements::dtype(&array), array.shape());
-    zip_write::Entry {
-        name: format!("{name}.npy"),
-        length: (header.len() + elements::length(&array)) as u64,
-        produce: Box::new(move |sink| {
-            sink(&header)?;
-            elements::produce(&array, sink)
-        }),
+/// An NPZ file written an array at a time, and an array in parts: for what does not fit into memory.
+///
+/// The bytes are those of [`write_arrays`]. The file has no name until [`Self::finish`]; dropped before, it is gone.
+pub struct Writer {
+    archive: zip_write::Archive<Draft>,
+    names: HashSet<String>,
+    /// The array that is being written in parts, and how many of its elements are to come.
+    open: Option<(String, usize)>,
+}
+
+impl Writer {
+    /// An empty file that is to go to `path` in the end.
+    pub fn create(path: &Path) -> Result<Self, FormatError> {
+        Ok(Self {
+            archive: zip_write::Archive::new(Draft::create(path)?),
+            names: HashSet::new(),
+            open: None,
+        })
+    }
+
+    /// Where the file is to go in the end.
+    pub fn path(&self) -> &Path {
+        self.archive.out().path()
+    }
+
+    /// Writes an array whole.
+    pub fn add(&mut self, name: &str, array: ArrayView) -> Result<(), FormatError> {
+        if let Some(reason) = misfit(&array) {
+            return Err(self.refuse(name, reason));
+        }
+        self.start(name, &array, elements::length(&array))?;
+        let archive = &mut self.archive;
+        let written = elements::produce(&array, &mut |part| archive.part(part));
+        let written = written.and_then(|()| archive.end());
+        written.map_err(|e| self.failed(e))
+    }
+
+    /// Begins an f64 array of this shape, whose elements come by [`Self::extend`], row-major.
+    pub fn begin(&mut self, name: &str, shape: &[usize]) -> Result<(), FormatError> {
+        let bytes = product(shape).and_then(|count| Some((count, count.checked_mul(8)?)));
+        let Some((count, bytes)) = bytes.filter(|_| shape.len() <= MAX_AXES) else {
+            let reason = format!("the shape {shape:?} is too large");
+            return Err(self.refuse(name, reason));
+        };
+        let none = ArrayView::F64 { shape, data: &[] };
+        self.start(name, &none, bytes)?;
+        self.open = Some((name.to_owned(), count));
+        self.close_if_full()
+    }
+
+    /// The next elements of the array begun.
+    pub fn extend(&mut self, data: &[f64]) -> Result<(), FormatError> {
+        match &mut self.open {
+            Some((_, left)) if data.len() <= *left => *left -= data.len(),
+            _ => return Err(self.unfinished(data.len())),
+        }
+        let shape = &[data.len()];
+        let archive = &mut self.archive;
+        let part = ArrayView::F64 { shape, data };
+        let written = elements::produce(&part, &mut |part| archive.part(part));
+        written.map_err(|e| self.failed(e))?;
+        self.close_if_full()
+    }
+
+    fn close_if_full(&mut self) -> Result<(), FormatError> {
+        if !matches!(self.open, Some((_, 0))) {
+            return Ok(());
+        }
+        self.open = None;
+        self.archive.end().map_err(|e| self.failed(e))
+    }
+
+    /// Gives the file its name.
+    pub fn finish(self) -> Result<(), FormatError> {
+        if self.open.is_some() {
+            return Err(self.unfinished(0));
+        }
+        let path = self.path().to_path_buf();
+        let draft = self.archive.finish();
+        draft.map_err(|e| FormatError::writing(&path, e))?.keep()
+    }
+
+    /// Everything of an entry before the elements; only the kind and shape of `array` are looked at.
+    fn start(&mut self, name: &str, array: &ArrayView, bytes: usize) -> Result<(), FormatError> {
+        if self.open.is_some() {
+            return Err(self.unfinished(0));
+        }
+        if let Some(reason) = self.bad_name(name) {
+            return Err(self.refuse(name, reason));
+        }
+        self.names.insert(name.to_owned());
+        let header = npy::header(&elements::dtype(array), array.shape());
+        let length = header.len() as u64 + bytes as u64;
+        let begun = self.archive.begin(format!("{name}.npy"), length);
+        let begun = begun.and_then(|()| self.archive.part(&header));
+        begun.map_err(|e| self.failed(e))
+    }
+
+    fn bad_name(&self, name: &str) -> Option<String> {
+        if name.is_empty() || name.len() > 1000 || name.contains('\0') {
+            return Some("its name must have 1 to 1000 bytes and no NUL".into());
+        }
+        let repeated = self.names.contains(name);
+        repeated.then(|| "another array has the same name".into())
+    }
+
+    fn unfinished(&self, found: usize) -> FormatError {
+        let (name, left) = self.open.as_ref().map_or(("", 0), |(n, left)| (n, *left));
+        let reason = format!("{left} of its elements are to come, found {found}");
+        self.refuse(name, reason)
+    }
+
+    fn refuse(&self, array: &str, reason: String) -> FormatError {
+        let array = array.to_owned();
+        let problem = NpzProblem::CannotWrite { array, reason };
+        refuse(self.path(), problem)
+    }
+
+    fn failed(&self, source: std::io::Error) -> FormatError {
+        FormatError::writing(self.path(), source)
     }
 }
 
@@ -116,31 +215,28 @@ fn refuse(path: &Path, problem: NpzProblem) -> FormatError {
     }
 }
 
-/// Why an array cannot be written so that it reads back the same, if so.
-fn obstacle(name: &str, array: &ArrayView, repeated: bool) -> Option<String> {
-    if name.is_empty() || name.len() > 1000 || name.contains('\0') {
-        return Some("its name must have 1 to 1000 bytes and no NUL".into());
-    }
-    if repeated {
-        return Some("another array has the same name".into());
-    }
-    match array {
-        ArrayView::F64 { shape, data } => misfit(shape, data.len()),
-        ArrayView::I64 { shape, data } => misfit(shape, data.len()),
-        ArrayView::Text(text) => text.ends_with('\0').then(|| "the text ends in NUL".into()),
-    }
-}
+/// The most axes that numpy reads.
+const MAX_AXES: usize = 32;
 
-fn misfit(shape: &[usize], length: usize) -> Option<String> {
-    /// What numpy reads.
-    const MAX_AXES: usize = 32;
+/// Why an array cannot be written so that it reads back the same, if so.
+fn misfit(array: &ArrayView) -> Option<String> {
+    let (shape, length) = match array {
+        ArrayView::F64 { shape, data } => (shape, data.len()),
+        ArrayView::I64 { shape, data } => (shape, data.len()),
+        ArrayView::Text(text) => {
+            return text.ends_with('\0').then(|| "the text ends in NUL".into());
+        }
+    };
     if shape.len() > MAX_AXES {
         return Some(format!("{} axes, expected at most {MAX_AXES}", shape.len()));
     }
-    let product = shape
-        .iter()
-        .try_fold(1usize, |total, &n| total.checked_mul(n));
-    (product != Some(length)).then(|| format!("{length} elements do not fill the shape {shape:?}"))
+    let fits = product(shape) == Some(length);
+    (!fits).then(|| format!("{length} elements do not fill the shape {shape:?}"))
+}
+
+fn product(shape: &[usize]) -> Option<usize> {
+    let times = |total: usize, &n: &usize| total.checked_mul(n);
+    shape.iter().try_fold(1, times)
 }
 
 /// Reads a sequence from the arrays `V` (n, V, 3) of f64 or f32, which is widened, and `F` (F, 3) of 0-based integers.
@@ -150,35 +246,54 @@ pub fn read(path: &Path) -> Result<Sequence, FormatError> {
     let faces = faces(path, archive.read("F")?)?;
     let (frames, vertices, positions) = match archive.read("V")? {
         Array::F64 { shape, data } if matches!(shape[..], [_, _, 3]) => (shape[0], shape[1], data),
-        other => {
-            return Err(wrong_kind(
-                path,
-                "V",
-                "floats of shape (frames, vertices, 3)",
-                &other,
-            ));
-        }
+        other => return Err(wrong_kind(path, "V", POSITIONS, other.describe())),
     };
-    let connectivity =
-        Connectivity::new(vertices, faces).map_err(|source| FormatError::Connectivity {
-            path: path.to_path_buf(),
-            source,
-        })?;
-    Sequence::new(Arc::new(connectivity), frames, positions).map_err(|source| {
-        FormatError::Sequence {
-            path: path.to_path_buf(),
-            source,
-        }
+    let connectivity = connectivity(path, vertices, faces)?;
+    Sequence::new(connectivity, frames, positions).map_err(|source| FormatError::Sequence {
+        path: path.to_path_buf(),
+        source,
     })
 }
 
-fn wrong_kind(path: &Path, array: &str, expected: &'static str, found: &Array) -> FormatError {
+/// Opens what [`read`] reads, to be read some frames at a time. Memory holds those only, unless `V` is stored first index fastest: that must be
+/// read whole.
+pub(super) fn stream(path: &Path) -> Result<FrameStream, FormatError> {
+    let mut archive = Archive::open(path)?;
+    let faces = faces(path, archive.read("F")?)?;
+    let array = archive.into_rows("V")?;
+    let Some((frames, vertices)) = array.frames_of_points() else {
+        return Err(wrong_kind(path, "V", POSITIONS, array.describe()));
+    };
+    if array.is_first_index_fastest() {
+        return Ok(FrameStream::held(path, read(path)?));
+    }
+    let connectivity = connectivity(path, vertices, faces)?;
+    FrameStream::new(path, connectivity, frames, Box::new(array))
+}
+
+const POSITIONS: &str = "floats of shape (frames, vertices, 3)";
+
+fn connectivity(
+    path: &Path,
+    vertices: usize,
+    faces: Vec<[u32; 3]>,
+) -> Result<Arc<Connectivity>, FormatError> {
+    match Connectivity::new(vertices, faces) {
+        Ok(connectivity) => Ok(Arc::new(connectivity)),
+        Err(source) => Err(FormatError::Connectivity {
+            path: path.to_path_buf(),
+            source,
+        }),
+    }
+}
+
+fn wrong_kind(path: &Path, array: &str, expected: &'static str, found: String) -> FormatError {
     refuse(
         path,
         NpzProblem::Kind {
             array: array.to_string(),
             expected,
-            found: found.describe(),
+            found,
         },
     )
 }
@@ -191,7 +306,7 @@ fn faces(path: &Path, array: Array) -> Result<Vec<[u32; 3]>, FormatError> {
                 path,
                 "F",
                 "integers of shape (faces, 3)",
-                &other,
+                other.describe(),
             ));
         }
     };
@@ -214,26 +329,6 @@ fn faces(path: &Path, array: Array) -> Result<Vec<[u32; 3]>, FormatError> {
         .map(index)
         .collect::<Result<_, _>>()?;
     Ok(flat.as_chunks::<3>().0.to_vec())
-}
-
-/// Writes a sequence as `V` (n, V, 3) of f64 and `F` (F, 3) of int64, 0-based, bit for bit.
-pub fn write(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
-    let connectivity = sequence.connectivity();
-    let faces: Vec<i64> = connectivity
-        .faces()
-        .as_flattened()
-        .iter()
-        .map(|&v| v.into())
-        .collect();
-    let positions = ArrayView::F64 {
-        shape: &[sequence.frame_count(), connectivity.vertex_count(), 3],
-        data: sequence.positions(),
-    };
-    let faces = ArrayView::I64 {
-        shape: &[connectivity.faces().len(), 3],
-        data: &faces,
-    };
-    write_views(path, &[("V", positions), ("F", faces)])
 }
 
 #[cfg(test)]

@@ -25,9 +25,10 @@ use super::bytes;
 use super::error::FormatError;
 use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
+use crate::sequence::format::stream::{FrameStream, Source};
 use parse::{Fault, Summary, Visitor};
 pub use problem::ObjProblem;
-pub(super) use write::{write_frame, write_frames};
+pub(super) use write::{FolderWriter, write_frame};
 
 /// The fewest bytes a vertex takes: `v 0 0 0` and a line end, which the last line may lack.
 const BYTES_PER_VERTEX: u64 = 8;
@@ -76,6 +77,42 @@ fn read_frames(paths: &[PathBuf], first: &First, frame: &[f64]) -> Result<Vec<f6
     Ok(positions)
 }
 
+/// Opens OBJ files as the frames of one sequence, of which the first is read to know the connectivity; `path` is what named them.
+pub(super) fn stream(path: &Path, paths: Vec<PathBuf>) -> Result<FrameStream, FormatError> {
+    let Some(file) = paths.first() else {
+        return Err(FormatError::NoFrames {
+            path: path.to_path_buf(),
+        });
+    };
+    let (first, _) = First::read(file)?;
+    let connectivity = first.connectivity()?;
+    let frames = paths.len();
+    FrameStream::new(path, connectivity, frames, Box::new(Files { first, paths }))
+}
+
+/// OBJ files that are read on demand, those that are asked for together in parallel.
+struct Files {
+    first: First,
+    paths: Vec<PathBuf>,
+}
+
+impl Source for Files {
+    fn read(&mut self, first: usize, count: usize) -> Result<Vec<f64>, FormatError> {
+        let d = self.first.vertices as usize * 3;
+        let mut positions = vec![0.0; count * d];
+        let results: Vec<_> = positions
+            .par_chunks_exact_mut(d)
+            .zip(self.paths[first..first + count].par_iter())
+            .enumerate()
+            .map_init(Vec::new, |buffer, (at, (out, path))| {
+                self.first.compare(first + at + 1, path, buffer, out)
+            })
+            .collect();
+        results.into_iter().collect::<Result<(), _>>()?;
+        Ok(positions)
+    }
+}
+
 /// The first frame, with which the others must agree.
 struct First {
     path: PathBuf,
@@ -101,16 +138,13 @@ impl First {
         Ok((first, mesh.positions))
     }
 
-    fn connectivity(self) -> Result<Arc<Connectivity>, FormatError> {
-        let Self {
-            path,
-            vertices,
-            triangles,
-            ..
-        } = self;
-        match Connectivity::new(vertices as usize, triangles) {
+    fn connectivity(&self) -> Result<Arc<Connectivity>, FormatError> {
+        match Connectivity::new(self.vertices as usize, self.triangles.clone()) {
             Ok(connectivity) => Ok(Arc::new(connectivity)),
-            Err(source) => Err(FormatError::Connectivity { path, source }),
+            Err(source) => Err(FormatError::Connectivity {
+                path: self.path.clone(),
+                source,
+            }),
         }
     }
 

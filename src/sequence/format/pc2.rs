@@ -3,14 +3,18 @@
 //! The file is little-endian: `POINTCACHE2\0`, i32 version (1), i32 vertices V, f32 start frame, f32 sampling rate, i32
 //! frames n; then n x V x 3 f32. It must have exactly that length. Start and rate are ignored, and written as 0 and 1.
 
-use std::io::{Read, Write};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::bytes::{self, Draft};
 use super::error::FormatError;
 use super::files::frame_files;
 use super::obj;
+use crate::mesh::Connectivity;
 use crate::sequence::Sequence;
+use crate::sequence::format::stream::Source;
 
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
@@ -18,35 +22,67 @@ const HEADER: usize = 32;
 /// Reads the cache at `path` and the faces from the OBJ of the same stem or, without one, the only OBJ in the folder.
 /// Of that OBJ only the faces and the vertex count are used.
 pub(super) fn read(path: &Path) -> Result<Sequence, FormatError> {
-    let (mut file, size) = bytes::open(path)?;
-    let mut header = [0; HEADER];
-    if size < HEADER as u64 {
-        return Err(wrong_size(path, "header".into(), HEADER as u128, size));
-    }
-    file.read_exact(&mut header)
-        .map_err(|e| FormatError::reading(path, e))?;
-    let (frames, vertices) = parse_header(path, &header)?;
-    let expected = HEADER as u128 + frames as u128 * vertices as u128 * 12;
-    if expected != size.into() {
-        let what = format!("header says {frames} frames of {vertices} vertices");
-        return Err(wrong_size(path, what, expected, size));
-    }
-    let beside = obj::read(&[companion(path)?])?;
-    let connectivity = beside.connectivity().clone();
-    if connectivity.vertex_count() != vertices {
-        return Err(FormatError::VertexCount {
+    let mut cache = Cache::open(path)?;
+    let positions = cache.read(0, cache.frames)?;
+    Sequence::new(cache.connectivity, cache.frames, positions).map_err(|source| {
+        FormatError::Sequence {
             path: path.to_path_buf(),
-            frame: 1,
-            found: vertices as u64,
-            expected: connectivity.vertex_count() as u64,
-            first: companion(path)?,
-        });
-    }
-    let positions = read_floats(path, &mut file, frames * vertices * 3)?;
-    Sequence::new(connectivity, frames, positions).map_err(|source| FormatError::Sequence {
-        path: path.to_path_buf(),
-        source,
+            source,
+        }
     })
+}
+
+/// An open cache, whose frames are read on demand.
+pub(super) struct Cache {
+    path: PathBuf,
+    file: File,
+    pub(super) connectivity: Arc<Connectivity>,
+    pub(super) frames: usize,
+}
+
+impl Cache {
+    pub(super) fn open(path: &Path) -> Result<Self, FormatError> {
+        let (mut file, size) = bytes::open(path)?;
+        let mut header = [0; HEADER];
+        if size < HEADER as u64 {
+            return Err(wrong_size(path, "header".into(), HEADER as u128, size));
+        }
+        file.read_exact(&mut header)
+            .map_err(|e| FormatError::reading(path, e))?;
+        let (frames, vertices) = parse_header(path, &header)?;
+        let expected = HEADER as u128 + frames as u128 * vertices as u128 * 12;
+        if expected != size.into() {
+            let what = format!("header says {frames} frames of {vertices} vertices");
+            return Err(wrong_size(path, what, expected, size));
+        }
+        let beside = obj::read(&[companion(path)?])?;
+        let connectivity = beside.connectivity().clone();
+        if connectivity.vertex_count() != vertices {
+            return Err(FormatError::VertexCount {
+                path: path.to_path_buf(),
+                frame: 1,
+                found: vertices as u64,
+                expected: connectivity.vertex_count() as u64,
+                first: companion(path)?,
+            });
+        }
+        Ok(Self {
+            path: path.to_path_buf(),
+            file,
+            connectivity,
+            frames,
+        })
+    }
+}
+
+impl Source for Cache {
+    fn read(&mut self, first: usize, count: usize) -> Result<Vec<f64>, FormatError> {
+        let d = self.connectivity.vertex_count() * 3;
+        let at = HEADER as u64 + first as u64 * d as u64 * 4;
+        let sought = self.file.seek(SeekFrom::Start(at));
+        sought.map_err(|e| FormatError::reading(&self.path, e))?;
+        read_floats(&self.path, &mut self.file, count * d)
+    }
 }
 
 fn wrong_size(path: &Path, what: String, expected: u128, found: u64) -> FormatError {
@@ -122,47 +158,86 @@ fn read_floats(path: &Path, file: &mut impl Read, count: usize) -> Result<Vec<f6
     Ok(floats)
 }
 
-/// Writes the cache at `path` and beside it the OBJ of the same stem, with the first frame and the faces.
+/// A cache and beside it the OBJ of the same stem, with the first frame and the faces.
 ///
 /// That OBJ is replaced when it has the same vertex count and faces; any other is left alone and refused. Positions are
 /// rounded to f32; one too large for that is refused.
-pub(super) fn write(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
-    let header = header(sequence, path)?;
-    let beside = path.with_extension("obj");
-    refuse_foreign_mesh(sequence, &beside)?;
-    let mesh = Draft::write(&beside, |out| obj::write_frame(sequence, 0, out))?;
-    let cache = Draft::write(path, |out| {
-        out.write_all(&header)?;
-        for chunk in sequence.positions().chunks(1 << 12) {
-            let floats = chunk.iter().flat_map(|&x| (x as f32).to_le_bytes());
-            out.write_all(&floats.collect::<Vec<u8>>())?;
-        }
-        Ok(())
-    })?;
-    mesh.keep()?;
-    cache.keep()
+pub(super) struct Writer {
+    connectivity: Arc<Connectivity>,
+    cache: Draft,
+    /// Once the first frame is known.
+    mesh: Option<Draft>,
 }
 
-fn header(sequence: &Sequence, path: &Path) -> Result<Vec<u8>, FormatError> {
-    let refuse = |reason: String| FormatError::CannotHold {
+impl Writer {
+    pub(super) fn create(
+        path: &Path,
+        connectivity: Arc<Connectivity>,
+        frames: usize,
+    ) -> Result<Self, FormatError> {
+        let header = header(path, connectivity.vertex_count(), frames)?;
+        refuse_foreign_mesh(&connectivity, &path.with_extension("obj"))?;
+        Ok(Self {
+            cache: Draft::write(path, |out| out.write_all(&header))?,
+            mesh: None,
+            connectivity,
+        })
+    }
+
+    /// Where the cache is to go in the end.
+    pub(super) fn path(&self) -> &Path {
+        self.cache.path()
+    }
+
+    /// Frames of 3V positions, of which the first is number `from` (0-based).
+    pub(super) fn push(&mut self, positions: &[f64], from: usize) -> Result<(), FormatError> {
+        let d = self.connectivity.vertex_count() * 3;
+        if let Some(at) = positions.iter().position(|&x| !(x as f32).is_finite()) {
+            let reason = format!(
+                "frame {} (1-based), vertex {} (0-based): {} is too large for f32; write a .npz",
+                from + at / d + 1,
+                at % d / 3,
+                positions[at]
+            );
+            return Err(cannot_hold(self.path(), reason));
+        }
+        if self.mesh.is_none() && !positions.is_empty() {
+            let beside = self.path().with_extension("obj");
+            let frame = &positions[..d];
+            let mesh = Draft::write(&beside, |out| {
+                obj::write_frame(frame, &self.connectivity, out)
+            });
+            self.mesh = Some(mesh?);
+        }
+        for chunk in positions.chunks(1 << 12) {
+            let floats = chunk.iter().flat_map(|&x| (x as f32).to_le_bytes());
+            let written = self.cache.write_all(&floats.collect::<Vec<u8>>());
+            written.map_err(|e| FormatError::writing(self.path(), e))?;
+        }
+        Ok(())
+    }
+
+    /// Gives both files their names.
+    pub(super) fn finish(mut self) -> Result<(), FormatError> {
+        let flushed = self.cache.flush();
+        flushed.map_err(|e| FormatError::writing(self.path(), e))?;
+        self.mesh.map_or(Ok(()), Draft::keep)?;
+        self.cache.keep()
+    }
+}
+
+fn cannot_hold(path: &Path, reason: String) -> FormatError {
+    FormatError::CannotHold {
         path: path.to_path_buf(),
         reason,
-    };
-    let counts = [
-        sequence.connectivity().vertex_count(),
-        sequence.frame_count(),
-    ];
-    let [Ok(vertices), Ok(frames)] = counts.map(i32::try_from) else {
-        return Err(refuse("PC2 counts in 32 bits; write a .npz".into()));
-    };
-    let positions = sequence.positions();
-    if let Some(at) = positions.iter().position(|&x| !(x as f32).is_finite()) {
-        let (frame, vertex) = (at / sequence.dimension() + 1, at % sequence.dimension() / 3);
-        return Err(refuse(format!(
-            "frame {frame} (1-based), vertex {vertex} (0-based): {} is too large for f32; write a .npz",
-            positions[at]
-        )));
     }
+}
+
+fn header(path: &Path, vertices: usize, frames: usize) -> Result<Vec<u8>, FormatError> {
+    let [Ok(vertices), Ok(frames)] = [vertices, frames].map(i32::try_from) else {
+        let reason = "PC2 counts in 32 bits; write a .npz".into();
+        return Err(cannot_hold(path, reason));
+    };
     let mut header = MAGIC.to_vec();
     header.extend(1i32.to_le_bytes());
     header.extend(vertices.to_le_bytes());
@@ -172,12 +247,12 @@ fn header(sequence: &Sequence, path: &Path) -> Result<Vec<u8>, FormatError> {
     Ok(header)
 }
 
-fn refuse_foreign_mesh(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
+fn refuse_foreign_mesh(connectivity: &Connectivity, path: &Path) -> Result<(), FormatError> {
     if !path.exists() {
         return Ok(());
     }
     match obj::read(&[path.to_path_buf()]) {
-        Ok(there) if there.connectivity() == sequence.connectivity() => Ok(()),
+        Ok(there) if **there.connectivity() == *connectivity => Ok(()),
         _ => Err(FormatError::WouldOverwrite {
             path: path.to_path_buf(),
             reason: "the OBJ with the faces of a PC2 goes here, but this one holds another mesh"

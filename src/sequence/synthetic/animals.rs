@@ -4,10 +4,14 @@
 //! example pairs of deformation transfer (Cashman & Hormann 2012, section 4.3), and the answer to compare a transfer with: the gallop given to
 //! the hound is [`posed`]`(Animal::Hound, ..)` in the poses of [`gallop::pose`].
 
+use nalgebra::Vector3;
+
+use super::body::Body;
 use super::horse::HORSE;
 use super::hound::HOUND;
 use super::quadruped::{Anatomy, BONES, quadruped};
 use super::skin::Weights;
+use super::surface_nets::Surface;
 use super::{Marker, SyntheticError, assemble, body, gallop};
 use crate::sequence::Sequence;
 
@@ -51,22 +55,49 @@ pub fn markers(animal: Animal) -> Vec<Marker> {
         .collect()
 }
 
-/// An animal in these poses, one a frame; how far the whole body moves follows from the length of its legs. At least one pose.
+/// An animal that can take any pose.
+pub(super) struct Puppet {
+    body: Body,
+    skin: Surface,
+    weights: Weights,
+    size: f64,
+}
+
+impl Puppet {
+    pub(super) fn new(animal: Animal) -> Self {
+        let (anatomy, limb, spacing) = animal.build();
+        let body = quadruped(anatomy, limb);
+        let skin = body.skin(spacing);
+        Self {
+            weights: Weights::new(&body, &skin, spacing, REACH),
+            body,
+            skin,
+            size: anatomy.size,
+        }
+    }
+
+    /// The faces of its skin.
+    pub(super) fn faces(&self) -> &[[u32; 3]] {
+        &self.skin.faces
+    }
+
+    /// The skin in a pose; how far the whole body moves follows from the length of its legs.
+    pub(super) fn take(&self, pose: &Pose) -> Vec<Vector3<f64>> {
+        let mut pose = pose.clone();
+        pose.root.translation.vector *= self.size;
+        self.weights
+            .skin(&self.skin.points, &self.body.place(&pose))
+    }
+}
+
+/// An animal in these poses, one a frame. At least one pose.
 pub fn posed(animal: Animal, poses: &[Pose]) -> Result<Sequence, SyntheticError> {
     if poses.is_empty() {
         return Err(SyntheticError::NoFrames);
     }
-    let (anatomy, limb, spacing) = animal.build();
-    let body = quadruped(anatomy, limb);
-    let skin = body.skin(spacing);
-    let weights = Weights::new(&body, &skin, spacing, REACH);
-    let frame = |pose: &Pose| {
-        let mut pose = pose.clone();
-        pose.root.translation.vector *= anatomy.size;
-        weights.skin(&skin.points, &body.place(&pose))
-    };
-    let frames: Vec<_> = poses.iter().map(frame).collect();
-    assemble(skin.faces, &frames)
+    let puppet = Puppet::new(animal);
+    let frames: Vec<_> = poses.iter().map(|pose| puppet.take(pose)).collect();
+    assemble(puppet.skin.faces, &frames)
 }
 
 /// The frames of `@gallop` (0-based) that follow the animal at rest in `@gallop-poses`: seven phases of a cycle, taken from both cycles.

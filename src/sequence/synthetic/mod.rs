@@ -3,7 +3,8 @@
 //! Every sequence is deterministic to the bit on one machine (one thread, no clock, no chance) and takes well under a second in a release
 //! build. Lengths are in metres in spirit: y is up, x is forward or along, z completes a right-handed frame. Frames are 0-based here and
 //! 1-based on the command line. Each name has a `-small` variant of a few hundred vertices for tests. Most are motions; `@face`,
-//! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time.
+//! `@gallop-poses` and `@trot-poses` are collections of poses, whose frames do not follow each other in time. `@roam` goes on for ever:
+//! `@roam:5000` are its first 5,000 frames, which [`stream_embedded`] makes one by one.
 
 pub mod animals;
 pub mod bar;
@@ -15,6 +16,7 @@ pub mod gallop;
 pub mod jelly;
 pub mod klein;
 pub mod ring;
+pub mod roam;
 pub mod roll;
 pub mod trot;
 
@@ -27,18 +29,22 @@ mod grid;
 mod horse;
 mod hound;
 mod implicit;
+mod motion;
 mod quadruped;
 mod ride;
 mod skin;
 mod soft_body;
 mod surface_nets;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use self::animals::Animal;
+use self::motion::Motion;
+use super::format::stream::FrameStream;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
 
@@ -58,6 +64,8 @@ pub struct Entry {
     /// What it is good for, in one line.
     pub good_for: &'static str,
     build: fn() -> Result<Sequence, SyntheticError>,
+    /// The motion, where it has no end.
+    endless: Option<fn() -> Result<Motion, SyntheticError>>,
 }
 
 /// A named place of a body and the vertex nearest to it at rest.
@@ -80,6 +88,16 @@ pub enum SyntheticError {
         /// Every name there is, separated by commas.
         known: String,
     },
+    /// A length that cannot be given.
+    #[error(
+        "{name}: expected a number of frames from 1 to {MOST_FRAMES} behind the colon, and a motion without an end: one of {endless}"
+    )]
+    BadLength {
+        /// The name asked for.
+        name: String,
+        /// Every name that takes a length, separated by commas.
+        endless: String,
+    },
     /// No frames were asked for.
     #[error("expected at least one frame to make, found none; ask for one or more")]
     NoFrames,
@@ -99,16 +117,58 @@ pub enum SyntheticError {
     Sequence(#[from] SequenceError),
 }
 
-/// Makes the embedded sequence of this name (with its `@`, as in [`catalogue`]).
+/// The longest that an endless motion is asked for.
+pub const MOST_FRAMES: usize = 1_000_000;
+
+/// Makes the embedded sequence of this name (with its `@`, as in [`catalogue`]). A name and `:N` are the first N frames of a motion that has no
+/// end.
 pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
-    (entry(name)?.build)()
+    match asked(name)? {
+        Asked::Whole(entry) => (entry.build)(),
+        Asked::Endless(motion, frames) => motion()?.sequence(frames),
+    }
+}
+
+/// What [`embedded`] makes, to be made some frames at a time where the motion has no end.
+pub fn stream_embedded(name: &str) -> Result<FrameStream, SyntheticError> {
+    let path = Path::new(name);
+    match asked(name)? {
+        Asked::Whole(entry) => Ok(FrameStream::held(path, (entry.build)()?)),
+        Asked::Endless(motion, frames) => motion()?.stream(path, frames),
+    }
+}
+
+enum Asked {
+    Whole(&'static Entry),
+    Endless(fn() -> Result<Motion, SyntheticError>, usize),
+}
+
+fn asked(name: &str) -> Result<Asked, SyntheticError> {
+    let Some((base, length)) = name.split_once(':') else {
+        let entry = entry(name)?;
+        return Ok(match entry.endless {
+            Some(motion) => Asked::Endless(motion, entry.frames),
+            None => Asked::Whole(entry),
+        });
+    };
+    let length = length.parse().ok();
+    let length = length.filter(|n| (1..=MOST_FRAMES).contains(n));
+    match (entry(base)?.endless, length) {
+        (Some(motion), Some(frames)) => Ok(Asked::Endless(motion, frames)),
+        _ => Err(SyntheticError::BadLength {
+            name: name.to_owned(),
+            endless: names(|entry| entry.endless.is_some()),
+        }),
+    }
 }
 
 /// The markers of the embedded sequence of this name: the same names in the same order for all quadrupeds, none for the others.
 pub fn markers(name: &str) -> Result<Vec<Marker>, SyntheticError> {
     Ok(match entry(name)?.name {
-        "@gallop" | "@gallop-poses" => animals::markers(Animal::Horse),
-        "@gallop-small" | "@gallop-poses-small" => animals::markers(Animal::SmallHorse),
+        "@gallop" | "@gallop-poses" | "@roam" => animals::markers(Animal::Horse),
+        "@gallop-small" | "@gallop-poses-small" | "@roam-small" => {
+            animals::markers(Animal::SmallHorse)
+        }
         "@trot" | "@trot-poses" => animals::markers(Animal::Hound),
         "@trot-small" | "@trot-poses-small" => animals::markers(Animal::SmallHound),
         _ => Vec::new(),
@@ -119,7 +179,7 @@ fn entry(name: &str) -> Result<&'static Entry, SyntheticError> {
     let found = CATALOGUE.iter().find(|entry| entry.name == name);
     found.ok_or_else(|| SyntheticError::Unknown {
         name: name.to_owned(),
-        known: known_names(),
+        known: names(|_| true),
     })
 }
 
@@ -128,9 +188,9 @@ pub fn catalogue() -> &'static [Entry] {
     CATALOGUE
 }
 
-fn known_names() -> String {
-    let names: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
-    names.join(", ")
+fn names(of: impl Fn(&Entry) -> bool) -> String {
+    let names = CATALOGUE.iter().filter(|entry| of(entry));
+    names.map(|entry| entry.name).collect::<Vec<_>>().join(", ")
 }
 
 /// Stacks frames of points into a sequence over `faces`.
@@ -167,6 +227,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 4096,
         good_for: "deformation gradients, known in closed form at every point and frame",
         build: || bar::build(&bar::FULL),
+        endless: None,
     },
     Entry {
         name: "@bar-small",
@@ -176,6 +237,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 516,
         good_for: "tests of gradients",
         build: || bar::build(&bar::SMALL),
+        endless: None,
     },
     Entry {
         name: "@roll",
@@ -185,6 +247,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 2400,
         good_for: "isometry and rotations beyond a half turn: every triangle keeps its shape",
         build: || roll::build(&roll::FULL, roll::FRAMES),
+        endless: None,
     },
     Entry {
         name: "@roll-small",
@@ -194,6 +257,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 240,
         good_for: "tests of isometry and of unwrapped rotations",
         build: || roll::build(&roll::SMALL, roll::FRAMES),
+        endless: None,
     },
     Entry {
         name: "@flag",
@@ -203,6 +267,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 5776,
         good_for: "the size of the flag of Cashman & Hormann 2012, Table 1: F = 5776, n = 100, 9F + 3 = 51987",
         build: || flag::build(&flag::FULL),
+        endless: None,
     },
     Entry {
         name: "@flag-small",
@@ -212,6 +277,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 256,
         good_for: "tests on an open surface with a nearly periodic motion",
         build: || flag::build(&flag::SMALL),
+        endless: None,
     },
     Entry {
         name: "@gallop",
@@ -221,6 +287,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 8160,
         good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
         build: || gallop::build(Animal::Horse),
+        endless: None,
     },
     Entry {
         name: "@gallop-small",
@@ -230,6 +297,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 1264,
         good_for: "tests of articulated motion and of transfer between different connectivities",
         build: || gallop::build(Animal::SmallHorse),
+        endless: None,
     },
     Entry {
         name: "@jelly",
@@ -239,6 +307,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 3000,
         good_for: "large elastic deformation that never repeats, hard as the cow of Cashman & Hormann 2012, Figure 6",
         build: || jelly::build(&jelly::FULL),
+        endless: None,
     },
     Entry {
         name: "@jelly-small",
@@ -248,6 +317,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 984,
         good_for: "tests of large elastic deformation",
         build: || jelly::build(&jelly::SMALL),
+        endless: None,
     },
     Entry {
         name: "@book",
@@ -257,6 +327,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 6144,
         good_for: "a non-manifold mesh: eight triangles at every edge of the spine",
         build: || book::build(&book::FULL),
+        endless: None,
     },
     Entry {
         name: "@book-small",
@@ -266,6 +337,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 540,
         good_for: "tests on non-manifold edges",
         build: || book::build(&book::SMALL),
+        endless: None,
     },
     Entry {
         name: "@klein",
@@ -275,6 +347,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 6912,
         good_for: "a closed surface with one side: no outward normal, no volume",
         build: || klein::build(&klein::FULL),
+        endless: None,
     },
     Entry {
         name: "@klein-small",
@@ -284,6 +357,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 784,
         good_for: "tests on a surface that cannot be oriented",
         build: || klein::build(&klein::SMALL),
+        endless: None,
     },
     Entry {
         name: "@character",
@@ -293,6 +367,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 7666,
         good_for: "the size of Cashman & Hormann 2012, Figure 5 and Table 1: V = 3835, n = 99, d = 11505; large turns of limbs",
         build: || character::build(&character::FULL),
+        endless: None,
     },
     Entry {
         name: "@character-small",
@@ -302,6 +377,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 1360,
         good_for: "tests of large turns of limbs",
         build: || character::build(&character::SMALL),
+        endless: None,
     },
     Entry {
         name: "@trot",
@@ -311,6 +387,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 7448,
         good_for: "transfer to or from @gallop, by the same joint markers on another connectivity",
         build: || trot::build(Animal::Hound),
+        endless: None,
     },
     Entry {
         name: "@trot-small",
@@ -320,6 +397,27 @@ const CATALOGUE: &[Entry] = &[
         faces: 1372,
         good_for: "tests of transfer between different connectivities",
         build: || trot::build(Animal::SmallHound),
+        endless: None,
+    },
+    Entry {
+        name: "@roam",
+        summary: "a quadruped in place that changes between gallop and trot and never repeats; @roam:5000 for 5,000 frames",
+        frames: roam::FRAMES,
+        vertices: 4082,
+        faces: 8160,
+        good_for: "sequences of any length: every frame is made by itself",
+        build: || roam::motion(Animal::Horse)?.sequence(roam::FRAMES),
+        endless: Some(|| roam::motion(Animal::Horse)),
+    },
+    Entry {
+        name: "@roam-small",
+        summary: "@roam with the animal of @gallop-small, fewer frames unless it says how many",
+        frames: roam::SMALL_FRAMES,
+        vertices: 634,
+        faces: 1264,
+        good_for: "tests of long sequences",
+        build: || roam::motion(Animal::SmallHorse)?.sequence(roam::SMALL_FRAMES),
+        endless: Some(|| roam::motion(Animal::SmallHorse)),
     },
     Entry {
         name: "@gallop-poses",
@@ -329,6 +427,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 8160,
         good_for: "the source examples of a transfer with m = 7, as in Cashman & Hormann 2012, Figure 7",
         build: || animals::build_poses(Animal::Horse),
+        endless: None,
     },
     Entry {
         name: "@gallop-poses-small",
@@ -338,6 +437,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 1264,
         good_for: "tests of transfer by examples",
         build: || animals::build_poses(Animal::SmallHorse),
+        endless: None,
     },
     Entry {
         name: "@trot-poses",
@@ -347,6 +447,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 7448,
         good_for: "the target examples of a transfer of @gallop",
         build: || animals::build_poses(Animal::Hound),
+        endless: None,
     },
     Entry {
         name: "@trot-poses-small",
@@ -356,6 +457,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 1372,
         good_for: "tests of transfer by examples",
         build: || animals::build_poses(Animal::SmallHound),
+        endless: None,
     },
     Entry {
         name: "@face",
@@ -365,6 +467,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 6144,
         good_for: "designing a sequence from poses, as in Cashman & Hormann 2012, Figure 8",
         build: || face::build(&face::FULL),
+        endless: None,
     },
     Entry {
         name: "@face-small",
@@ -374,6 +477,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 864,
         good_for: "tests of design from poses",
         build: || face::build(&face::SMALL),
+        endless: None,
     },
     Entry {
         name: "@loop",
@@ -383,6 +487,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 5376,
         good_for: "looping: the last frame leads into the first",
         build: || ring::build(&ring::FULL),
+        endless: None,
     },
     Entry {
         name: "@loop-small",
@@ -392,6 +497,7 @@ const CATALOGUE: &[Entry] = &[
         faces: 792,
         good_for: "tests of looping, and of a closed surface with a handle",
         build: || ring::build(&ring::SMALL),
+        endless: None,
     },
 ];
 
@@ -463,6 +569,32 @@ mod tests {
                     .any(|e| format!("{}-small", e.name) == entry.name)
             );
         }
+    }
+
+    #[test]
+    fn endless_motions_have_any_length_and_others_their_own() {
+        let (short, long) = (embedded("@roam-small:7"), embedded("@roam-small"));
+        let (short, long) = (short.unwrap(), long.unwrap());
+        assert_eq!(short.frame_count(), 7);
+        assert_eq!(short.positions(), &long.positions()[..7 * long.dimension()]);
+        for name in [
+            "@roam:0",
+            "@roam:1000001",
+            "@roam:",
+            "@roam:three",
+            "@roam:-3",
+            "@gallop:48",
+        ] {
+            let refused = stream_embedded(name).err().unwrap();
+            assert!(
+                matches!(refused, SyntheticError::BadLength { .. }),
+                "{name}"
+            );
+            assert_eq!(embedded(name).unwrap_err(), refused);
+            assert!(refused.to_string().contains("one of @roam, @roam-small"));
+        }
+        let unknown = embedded("@rome:3").unwrap_err();
+        assert!(matches!(unknown, SyntheticError::Unknown { .. }));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Named arrays from an NPZ file.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::npy::{self, Header, Refusal};
@@ -9,12 +9,15 @@ use super::zip_read::{self, Contents, Entry, ZipError};
 use super::{Array, NpzProblem, elements};
 use crate::sequence::format::bytes;
 use crate::sequence::format::error::FormatError;
+use crate::sequence::format::stream::Source;
 
 /// Deflate cannot pack better than this.
 const DEFLATE_LIMIT: u64 = 1032;
 /// Above this unpacked size, arrays must not be packed better than `PLAUSIBLE_RATIO`: positions never are.
 const LARGE: u64 = 1 << 30;
 const PLAUSIBLE_RATIO: u64 = 100;
+/// More names than these are not listed.
+const MOST_NAMES: usize = 20;
 
 /// An open NPZ file, whose directory has been read and whose arrays are read on demand.
 ///
@@ -63,17 +66,110 @@ impl Archive {
         self.try_read(array).map_err(|e| explain(&self.path, e))
     }
 
-    fn try_read(&mut self, array: &str) -> Result<Array, ZipError> {
-        let Some(entry) = self.entries.iter().find(|e| e.name == array) else {
-            return Err(NpzProblem::Missing {
-                array: array.to_string(),
-                found: self.names().map(str::to_string).collect(),
+    /// One array, to be read some rows at a time and only forward.
+    pub(super) fn into_rows(self, array: &str) -> Result<Rows, FormatError> {
+        let path = self.path.clone();
+        self.try_into_rows(array).map_err(|e| explain(&path, e))
+    }
+
+    fn try_into_rows(self, array: &str) -> Result<Rows, ZipError> {
+        let entry = self.entry(array)?.clone();
+        refuse_bomb(&entry)?;
+        let mut contents = Contents::open(self.file, self.size, &entry)?;
+        let header = read_header(&mut contents, array).map_err(|e| damage(e, array));
+        let (header, before) = header?;
+        let count = element_count(&header, before, &entry)?;
+        Ok(Rows {
+            path: self.path,
+            contents,
+            entry,
+            header,
+            count,
+            read: 0,
+        })
+    }
+
+    fn entry(&self, array: &str) -> Result<&Entry, NpzProblem> {
+        let found = self.entries.iter().find(|e| e.name == array);
+        found.ok_or_else(|| {
+            let mut found: Vec<_> = self.names().map(str::to_string).take(MOST_NAMES).collect();
+            if self.entries.len() > MOST_NAMES {
+                found.push("and more".into());
             }
-            .into());
-        };
+            let array = array.to_string();
+            NpzProblem::Missing { array, found }
+        })
+    }
+
+    fn try_read(&mut self, array: &str) -> Result<Array, ZipError> {
+        let entry = self.entry(array)?.clone();
+        let entry = &entry;
         refuse_bomb(entry)?;
         let mut contents = Contents::open(&mut self.file, self.size, entry)?;
         read_array(&mut contents, entry).map_err(|error| damage(error, array))
+    }
+}
+
+/// An array of floats that is read some rows at a time, forward.
+pub(super) struct Rows {
+    path: PathBuf,
+    contents: Contents<BufReader<File>>,
+    entry: Entry,
+    header: Header,
+    /// Elements there are, and have been read.
+    count: usize,
+    read: usize,
+}
+
+impl Rows {
+    /// n and V of floats of shape (n, V, 3); None for any other array.
+    pub(super) fn frames_of_points(&self) -> Option<(usize, usize)> {
+        match self.header.shape[..] {
+            [n, v, 3] if self.header.kind == npy::Kind::Float => Some((n as usize, v as usize)),
+            _ => None,
+        }
+    }
+
+    /// Whether rows are scattered over the whole array.
+    pub(super) fn is_first_index_fastest(&self) -> bool {
+        self.header.fortran
+    }
+
+    /// What this is, as [`Array::describe`] says it.
+    pub(super) fn describe(&self) -> String {
+        let kind = match self.header.kind {
+            npy::Kind::Float => "f64",
+            npy::Kind::Signed | npy::Kind::Unsigned => "i64",
+            npy::Kind::Text => return "text".into(),
+        };
+        format!("{kind} {:?}", self.header.shape)
+    }
+
+    /// Elements from here on; the last ones end with a look at the checksum of all.
+    fn next(&mut self, count: usize) -> Result<Vec<f64>, ZipError> {
+        let count = count.min(self.count - self.read);
+        let found = elements::floats(&mut self.contents, &self.header, count, &self.entry.name)?;
+        self.read += count;
+        if self.read == self.count && count > 0 {
+            check_end(&mut self.contents, &self.entry)?;
+        }
+        Ok(found)
+    }
+
+    fn rows(&mut self, first: usize, count: usize) -> Result<Vec<f64>, ZipError> {
+        let row = self.count / (self.header.shape[0].max(1) as usize);
+        while self.read < first * row {
+            let some = row.min(first * row - self.read);
+            self.next(some)?;
+        }
+        self.next(count * row)
+    }
+}
+
+impl Source for Rows {
+    fn read(&mut self, first: usize, count: usize) -> Result<Vec<f64>, FormatError> {
+        let found = self.rows(first, count);
+        found.map_err(|e| explain(&self.path, damage(e, &self.entry.name)))
     }
 }
 
@@ -119,10 +215,19 @@ fn refuse_bomb(entry: &Entry) -> Result<(), NpzProblem> {
     }
 }
 
-fn read_array(contents: &mut Contents, entry: &Entry) -> Result<Array, ZipError> {
+fn read_array<F: Read + Seek>(
+    contents: &mut Contents<F>,
+    entry: &Entry,
+) -> Result<Array, ZipError> {
     let (header, before) = read_header(contents, &entry.name)?;
     let count = element_count(&header, before, entry)?;
     let array = elements::read(contents, &header, count, &entry.name)?;
+    check_end(contents, entry)?;
+    Ok(array)
+}
+
+/// An error unless all has been read and has the right checksum.
+fn check_end<F: Read + Seek>(contents: &mut Contents<F>, entry: &Entry) -> Result<(), ZipError> {
     if contents.read(&mut [0])? != 0 {
         let reason = format!("array {} unpacks to more bytes than declared", entry.name);
         return Err(NpzProblem::Damaged { reason }.into());
@@ -134,12 +239,12 @@ fn read_array(contents: &mut Contents, entry: &Entry) -> Result<Array, ZipError>
             found,
         }
         .into()),
-        _ => Ok(array),
+        _ => Ok(()),
     }
 }
 
 /// The header and how many bytes it took.
-fn read_header(contents: &mut Contents, array: &str) -> Result<(Header, usize), ZipError> {
+fn read_header(contents: &mut impl Read, array: &str) -> Result<(Header, usize), ZipError> {
     let refuse = |refusal| {
         let array = array.to_string();
         match refusal {

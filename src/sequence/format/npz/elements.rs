@@ -60,7 +60,8 @@ fn chunks(source: &mut impl Read, length: usize, mut take: impl FnMut(&[u8])) ->
     Ok(())
 }
 
-fn floats(
+/// The next `count` floats, widened.
+pub(super) fn floats(
     source: &mut impl Read,
     header: &Header,
     count: usize,

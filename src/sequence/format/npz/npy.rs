@@ -199,7 +199,7 @@ pub(super) fn header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     let shape = format!("({}{comma})", lengths.join(", "));
     let text = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}");
     let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
-    // Version 2 exists for texts beyond 16 bits; callers keep shapes far below (see `obstacle`).
+    // Version 2 exists for texts beyond 16 bits; callers keep shapes far below (see `MAX_AXES`).
     let mut bytes = MAGIC.to_vec();
     bytes.extend([1, 0]);
     bytes.extend((length as u16).to_le_bytes());

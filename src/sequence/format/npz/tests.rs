@@ -29,16 +29,15 @@ fn problem(bytes: &[u8]) -> NpzProblem {
 
 /// An archive of one stored entry `a.npy`, with any contents.
 fn stored(contents: &[u8]) -> Vec<u8> {
-    let entry = zip_write::Entry {
-        name: "a.npy".into(),
-        length: contents.len() as u64,
-        produce: Box::new(|sink| sink(contents)),
-    };
-    let mut bytes = Vec::new();
+    let mut bytes = Cursor::new(Vec::new());
     let mut archive = zip_write::Archive::new(&mut bytes);
-    archive.add(&entry).unwrap();
+    archive
+        .begin("a.npy".into(), contents.len() as u64)
+        .unwrap();
+    archive.part(contents).unwrap();
+    archive.end().unwrap();
     archive.finish().unwrap();
-    bytes
+    bytes.into_inner()
 }
 
 /// A header with any dictionary, and contents.

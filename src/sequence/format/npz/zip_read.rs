@@ -95,7 +95,7 @@ pub(super) fn directory(file: &mut BufReader<File>, size: u64) -> Result<Vec<Ent
     }
 }
 
-fn read_at(file: &mut BufReader<File>, at: u64, length: u64) -> io::Result<Vec<u8>> {
+fn read_at(file: &mut (impl Read + Seek), at: u64, length: u64) -> io::Result<Vec<u8>> {
     file.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();
     file.take(length).read_to_end(&mut bytes)?;
@@ -234,24 +234,20 @@ fn diagnose(file: &mut BufReader<File>, size: u64) -> Result<NpzProblem, ZipErro
     })
 }
 
-/// The unpacked bytes of an entry, with the checksum of what has been read so far.
-pub(super) struct Contents<'a> {
-    source: Source<'a>,
+/// The unpacked bytes of an entry of a file, with the checksum of what has been read so far.
+pub(super) struct Contents<F> {
+    source: Source<F>,
     crc: Crc,
 }
 
-enum Source<'a> {
-    Stored(Take<&'a mut BufReader<File>>),
-    Deflated(Box<DeflateDecoder<Take<&'a mut BufReader<File>>>>),
+enum Source<F> {
+    Stored(Take<F>),
+    Deflated(Box<DeflateDecoder<Take<F>>>),
 }
 
-impl<'a> Contents<'a> {
+impl<F: Read + Seek> Contents<F> {
     /// Goes to an entry of an archive of `size` bytes, having seen that all its packed bytes are there.
-    pub(super) fn open(
-        file: &'a mut BufReader<File>,
-        size: u64,
-        entry: &Entry,
-    ) -> Result<Self, ZipError> {
+    pub(super) fn open(file: F, size: u64, entry: &Entry) -> Result<Self, ZipError> {
         let unsupported = |what: String| NpzProblem::Unsupported {
             array: entry.name.clone(),
             what,
@@ -280,11 +276,11 @@ impl<'a> Contents<'a> {
     }
 }
 
-fn packed_bytes<'a>(
-    file: &'a mut BufReader<File>,
+fn packed_bytes<F: Read + Seek>(
+    mut file: F,
     size: u64,
     entry: &Entry,
-) -> Result<Take<&'a mut BufReader<File>>, ZipError> {
+) -> Result<Take<F>, ZipError> {
     let cut_off = |expected| NpzProblem::CutOff {
         what: format!("entry {}", entry.name),
         expected,
@@ -294,7 +290,7 @@ fn packed_bytes<'a>(
     if header_end > size {
         return Err(cut_off(header_end).into());
     }
-    let fixed = read_at(file, entry.at, 30)?;
+    let fixed = read_at(&mut file, entry.at, 30)?;
     if !fixed.starts_with(b"PK\x03\x04") {
         return Err(damaged("an entry is not where its directory says").into());
     }
@@ -307,7 +303,7 @@ fn packed_bytes<'a>(
     Ok(file.take(entry.packed))
 }
 
-impl Read for Contents<'_> {
+impl<F: Read> Read for Contents<F> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let length = match &mut self.source {
             Source::Stored(source) => source.read(buffer)?,

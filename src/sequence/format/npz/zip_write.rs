@@ -1,6 +1,6 @@
 //! Archives of stored entries whose bytes depend on their contents only.
 
-use std::io::{self, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 
 use flate2::Crc;
 
@@ -9,16 +9,11 @@ const DATE: u16 = 0x21;
 /// From here on, a size or an offset goes into a ZIP64 field.
 const LARGE: u64 = u32::MAX as u64;
 
-/// One entry: its name, and its contents in parts that can be produced again and again.
-pub(super) struct Entry<'a> {
-    pub(super) name: String,
-    pub(super) length: u64,
-    /// Passes the contents, in parts of any length, to its argument.
-    pub(super) produce: Box<dyn Fn(Sink) -> io::Result<()> + 'a>,
-}
-
 /// Takes a part of the contents.
 pub(super) type Sink<'a> = &'a mut dyn FnMut(&[u8]) -> io::Result<()>;
+
+/// Where the checksum stands in a local header.
+const CRC_AT: u64 = 14;
 
 struct Written {
     name: String,
@@ -34,9 +29,11 @@ pub(super) struct Archive<W> {
     entries: u64,
     directory: Vec<u8>,
     large: u64,
+    /// The entry that is being written, and the checksum of its contents so far.
+    open: Option<(Written, Crc)>,
 }
 
-impl<W: Write> Archive<W> {
+impl<W: Write + Seek> Archive<W> {
     pub(super) fn new(out: W) -> Self {
         Self::with_threshold(out, LARGE)
     }
@@ -48,37 +45,59 @@ impl<W: Write> Archive<W> {
             entries: 0,
             directory: Vec::new(),
             large,
+            open: None,
         }
     }
 
-    /// The entry is produced twice: for its checksum and to be written.
-    pub(super) fn add(&mut self, entry: &Entry) -> io::Result<()> {
-        let mut crc = Crc::new();
-        (entry.produce)(&mut |part| {
-            crc.update(part);
-            Ok(())
-        })?;
+    /// What is written to.
+    pub(super) fn out(&self) -> &W {
+        &self.out
+    }
+
+    /// Begins an entry of so many bytes, which [`Self::part`] writes and [`Self::end`] ends.
+    pub(super) fn begin(&mut self, name: String, length: u64) -> io::Result<()> {
         let written = Written {
-            name: entry.name.clone(),
-            length: entry.length,
-            crc: crc.sum(),
+            name,
+            length,
+            crc: 0,
             at: self.at,
         };
         let header = written.local_header(self.large);
         self.out.write_all(&header)?;
-        (entry.produce)(&mut |part| self.out.write_all(part))?;
-        self.at += header.len() as u64 + entry.length;
+        self.at += header.len() as u64 + length;
+        self.open = Some((written, Crc::new()));
+        Ok(())
+    }
+
+    /// The next bytes of the entry.
+    pub(super) fn part(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if let Some((_, crc)) = &mut self.open {
+            crc.update(bytes);
+        }
+        self.out.write_all(bytes)
+    }
+
+    /// Goes back to put the checksum into the entry's header; nothing where no entry is open.
+    pub(super) fn end(&mut self) -> io::Result<()> {
+        let Some((mut written, crc)) = self.open.take() else {
+            return Ok(());
+        };
+        written.crc = crc.sum();
+        self.out.seek(SeekFrom::Start(written.at + CRC_AT))?;
+        self.out.write_all(&written.crc.to_le_bytes())?;
+        self.out.seek(SeekFrom::Start(self.at))?;
         self.entries += 1;
         self.directory.extend(written.directory_entry(self.large));
         Ok(())
     }
 
     /// Writes the directory.
-    pub(super) fn finish(mut self) -> io::Result<()> {
+    pub(super) fn finish(mut self) -> io::Result<W> {
         self.out.write_all(&self.directory)?;
         let size = self.directory.len() as u64;
-        self.out
-            .write_all(&end(self.entries, size, self.at, self.large))
+        let end = end(self.entries, size, self.at, self.large);
+        self.out.write_all(&end)?;
+        Ok(self.out)
     }
 }
 
@@ -190,17 +209,18 @@ mod tests {
                 vec![0; 16],
             ]
             .concat();
-            let entry = |name: &str| Entry {
-                name: name.into(),
-                length: array.len() as u64,
-                produce: Box::new(|sink| sink(&array)),
-            };
-            let mut bytes = Vec::new();
+            let mut bytes = Cursor::new(Vec::new());
             let mut archive = Archive::with_threshold(&mut bytes, large);
-            archive.add(&entry("a.npy")).unwrap();
-            archive.add(&entry("ä.npy")).unwrap();
+            for name in ["a.npy", "ä.npy"] {
+                archive.begin(name.into(), array.len() as u64).unwrap();
+                let (head, tail) = array.split_at(11);
+                archive.part(head).unwrap();
+                archive.part(tail).unwrap();
+                archive.end().unwrap();
+            }
             archive.finish().unwrap();
-            let mut archive = npyz::npz::NpzArchive::new(Cursor::new(bytes)).unwrap();
+            bytes.set_position(0);
+            let mut archive = npyz::npz::NpzArchive::new(bytes).unwrap();
             for name in ["a", "ä"] {
                 let read = archive.by_name(name).unwrap().unwrap();
                 assert_eq!(
