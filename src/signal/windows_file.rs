@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use super::file::{
     OWN, RepresentationError, Stored, WINDOWS_FORMAT as FORMAT, inconsistent, load, mesh, meta,
-    over, own, own_arrays, space_of,
+    named_format, over, own, own_arrays, space_of,
 };
 use super::windows::{Plan, blend};
 use crate::arrays::{Array, ArrayError, Bundle};
