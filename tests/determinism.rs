@@ -93,7 +93,7 @@ fn long_fits_do_not_depend_on_threads() {
 fn conversions_and_samples_do_not_depend_on_threads() {
     let scratch = Scratch::new();
     let [rep, windows] = ["rep.npz", "windows.npz"].map(|name| scratch.arg(name));
-    let fit = "signal fit @gallop-small --k 16 --l 12 --m 7 -o";
+    let fit = "signal fit @gallop-small --k 14 --l 12 --m 7 -o";
     must(&words(&format!("{fit} {rep}")));
     // Windows of 13 frames.
     let fit = "signal fit @gallop-small --k 12 --l 10 --m 7 -o";

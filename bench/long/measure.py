@@ -3,9 +3,9 @@
 
     bench/long/measure.py OUT [--frames 100,500,...] [--repeat R] [--whole-up-to N] [--limit SECONDS]
 
-Every fit and every sampling is a process of its own; its peak resident memory is what the operating system counted (wait4, ru_maxrss). Of R runs the
-median time and the greatest memory are kept. A whole fit that takes longer than the limit is ended, and said to have been. Writes OUT/table.csv,
-OUT/command.txt and OUT/machine.txt.
+Every fit and every sampling is a process of its own; its time on all processors and its peak resident memory are what the operating system counted
+(wait4: ru_utime + ru_stime, ru_maxrss), and wall time stands beside them. Of R runs the median times and the greatest memory are kept. What takes more
+processor time than the limit is ended, and said to have been. Writes OUT/table.csv, OUT/command.txt and OUT/machine.txt.
 """
 import argparse
 import csv
@@ -13,8 +13,8 @@ import json
 import os
 import pathlib
 import platform
+import resource
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
@@ -26,7 +26,7 @@ PROGRAM = HOME / "target/release/meshseq"
 
 
 def run(arguments, limit):
-    """Wall seconds and peak megabytes; None where the limit was reached."""
+    """Processor seconds, wall seconds and peak megabytes; None where the limit was reached."""
     start = time.perf_counter()
     child = os.posix_spawn(
         PROGRAM,
@@ -34,26 +34,25 @@ def run(arguments, limit):
         os.environ,
         file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)],
     )
-    signal.signal(signal.SIGALRM, lambda *_: os.kill(child, signal.SIGKILL))
-    signal.alarm(limit)
+    resource.prlimit(child, resource.RLIMIT_CPU, (limit, limit))
     _, status, usage = os.wait4(child, 0)
-    signal.alarm(0)
     if os.WIFSIGNALED(status):
         return None
     if status != 0:
         sys.exit(f"failed: {arguments}")
-    return time.perf_counter() - start, usage.ru_maxrss / 1024
+    return usage.ru_utime + usage.ru_stime, time.perf_counter() - start, usage.ru_maxrss / 1024
 
 
 def repeated(arguments, repeat, limit):
-    """The median time and the greatest memory of several runs."""
+    """The median times and the greatest memory of several runs."""
     runs = []
     for _ in range(repeat):
         found = run(arguments, limit)
         if found is None:
             return None
         runs.append(found)
-    return statistics.median(r[0] for r in runs), max(r[1] for r in runs)
+    processor, wall = (round(statistics.median(r[i] for r in runs), 3) for i in range(2))
+    return processor, wall, round(max(r[2] for r in runs), 1)
 
 
 def row(name, n, way, choice, folder, options):
@@ -64,10 +63,10 @@ def row(name, n, way, choice, folder, options):
     line = {"sequence": name, "n": n, "way": way, "repeats": options.repeat}
     found = repeated(fit, options.repeat, options.limit)
     if found is None:
-        return line | {"note": f"ended after {options.limit} s"}
+        return line | {"note": f"ended after {options.limit} s of processor time"}
     numbers = json.loads(told.read_text())
     windows = numbers.get("windows", [numbers])
-    line |= {"fit_seconds": round(found[0], 3), "fit_peak_mb": round(found[1], 1)}
+    line |= dict(zip(["fit_processor_seconds", "fit_wall_seconds", "fit_peak_mb"], found))
     sampled = repeated(["signal", "sample", rep, "--rate", 2, "-o", out], options.repeat, options.limit)
     line |= {
         "rms_relative_percent": round(100 * numbers["rms_relative"], 5),
@@ -77,13 +76,13 @@ def row(name, n, way, choice, folder, options):
         "given_numbers": 3 * n * numbers["V"],
     }
     if sampled:
-        line |= {"sample_seconds": round(sampled[0], 3), "sample_peak_mb": round(sampled[1], 1)}
+        line |= dict(zip(["sample_processor_seconds", "sample_wall_seconds", "sample_peak_mb"], sampled))
     return line
 
 
 COLUMNS = [
-    "sequence", "n", "way", "repeats", "fit_seconds", "fit_peak_mb", "sample_seconds", "sample_peak_mb", "rms_relative_percent",
-    "windows", "k", "l", "m", "stored_numbers", "given_numbers", "note",
+    "sequence", "n", "way", "repeats", "fit_processor_seconds", "fit_wall_seconds", "fit_peak_mb", "sample_processor_seconds",
+    "sample_wall_seconds", "sample_peak_mb", "rms_relative_percent", "windows", "k", "l", "m", "stored_numbers", "given_numbers", "note",
 ]  # fmt: skip
 
 
@@ -113,7 +112,7 @@ def main():
     parser.add_argument("--tolerance", default="0.01")
     parser.add_argument("--whole-up-to", type=int, default=5000)
     parser.add_argument("--repeat", type=int, default=1)
-    parser.add_argument("--limit", type=int, default=600, help="seconds for one process")
+    parser.add_argument("--limit", type=int, default=600, help="processor seconds for one process")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "machine.txt").write_text(machine())
