@@ -15,7 +15,7 @@ const PROVEN: RangeInclusive<f64> = 1.8e-43..=3.2e60;
 
 /// The sign of det[a-c b-c]: whether a, b, c turn counter-clockwise (`Greater`), clockwise, or are in a line (`Equal`).
 pub(super) fn side_of_line(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
-    if [a, b, c].as_flattened().iter().all(proven) {
+    if proven([a, b, c].as_flattened()) {
         let [a, b, c] = [a, b, c].map(|[x, y]| Coord { x, y });
         return sign(orient2d(a, b, c));
     }
@@ -29,7 +29,7 @@ pub(super) fn side_of_line(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
 
 /// The sign of det[a-d b-d c-d]: on which side of the plane of a, b, c the point d is; `Equal` where the four are in a plane.
 pub(super) fn side_of_plane(a: Point, b: Point, c: Point, d: Point) -> Ordering {
-    if [a, b, c, d].as_flattened().iter().all(proven) {
+    if proven([a, b, c, d].as_flattened()) {
         let [a, b, c, d] = [a, b, c, d].map(|[x, y, z]| Coord3D { x, y, z });
         return sign(orient3d(a, b, c, d));
     }
@@ -43,9 +43,11 @@ pub(super) fn side_of_plane(a: Point, b: Point, c: Point, d: Point) -> Ordering 
     sum.sign()
 }
 
-fn proven(x: &f64) -> bool {
-    let size = x.abs();
-    size == 0.0 || PROVEN.contains(&size)
+/// Without branches, for all of the work is often to ask this.
+#[inline]
+fn proven(coordinates: &[f64]) -> bool {
+    let fits = |x: &f64| (*x == 0.0) | PROVEN.contains(&x.abs());
+    coordinates.iter().fold(true, |all, x| all & fits(x))
 }
 
 fn sign(determinant: f64) -> Ordering {
