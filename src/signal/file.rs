@@ -243,7 +243,7 @@ pub(super) fn mesh(
     place: &str,
 ) -> Result<Arc<Connectivity>, RepresentationError> {
     let faces = bundle.triangles("F").map_err(|e| arrays(place, e))?;
-    if numbers % 3 != 0 {
+    if !numbers.is_multiple_of(3) {
         let what = format!("{numbers} coordinates are no whole number of vertices");
         return Err(inconsistent(place, what));
     }

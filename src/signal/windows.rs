@@ -243,21 +243,22 @@ mod tests {
         }
         let frames = 3;
         assert_eq!(Plan::new(3, 10, 2), Err(PlanError::TooFewFrames { frames }));
-        let read = |windows: &[Range<usize>], overlap| {
-            Plan::from_windows(windows.to_vec(), overlap).map_err(|e| match e {
+        let read = |windows: &[[usize; 2]], overlap| {
+            let ranges = windows.iter().map(|&[start, end]| start..end);
+            Plan::from_windows(ranges.collect(), overlap).map_err(|e| match e {
                 PlanError::Astray { window, .. } => window,
                 _ => 0,
             })
         };
         assert_eq!(read(&[], 2), Err(0));
         for (windows, overlap, window) in [
-            (&[1..9][..], 0, 1),
-            (&[0..9, 8..20], 1, 1),
-            (&[0..9, 6..20], 2, 2),
-            (&[0..9, 7..10], 2, 2),
-            (&[0..9, 7..2], 2, 2),
-            (&[0..9, usize::MAX..2], 2, 2),
-            (&[0..9, 9..20], 0, 1),
+            (&[[1, 9]][..], 0, 1),
+            (&[[0, 9], [8, 20]], 1, 1),
+            (&[[0, 9], [6, 20]], 2, 2),
+            (&[[0, 9], [7, 10]], 2, 2),
+            (&[[0, 9], [7, 2]], 2, 2),
+            (&[[0, 9], [usize::MAX, 2]], 2, 2),
+            (&[[0, 9], [9, 20]], 0, 1),
         ] {
             assert_eq!(read(windows, overlap), Err(window), "{windows:?}");
         }
