@@ -192,6 +192,20 @@ fn malformed_cases_are_refused_by_file_and_case() {
     );
     says(with("frames = \"4..2\""), &["frames `4..2`", "A..B"]);
     says(with("every = 0"), &["every = 0"]);
+    let examples = "examples = [\"@gallop-poses\", \"@trot-poses\"]";
+    says(
+        with("examples = [\"@gallop-poses\"]"),
+        &["line 5", "examples"],
+    );
+    says(
+        with(&format!("resampled = true\n{examples}")),
+        &["resampled", "transferred"],
+    );
+    let read = GOOD.replace("signal.h", "sequence.read");
+    says(
+        refusal(&format!("{read}resampled = true\n")),
+        &["sequence.read", "files"],
+    );
     says(with("knots = \"even\""), &["literal", "symmetric", "even"]);
     says(with("timeout_seconds = 0"), &["timeout_seconds = 0"]);
     says(

@@ -46,6 +46,15 @@ fn words(text: &str) -> Vec<String> {
 }
 
 #[test]
+fn self_intersections_do_not_depend_on_threads() {
+    for sequence in ["@klein-small", "@trot-small"] {
+        same_bytes("quality.csv", |out| {
+            words(&format!("info {sequence} --quality {out}"))
+        });
+    }
+}
+
+#[test]
 fn fits_do_not_depend_on_threads() {
     for choice in [
         "@gallop-small --k 16 --l 12 --m 7",
@@ -86,6 +95,8 @@ fn conversions_and_samples_do_not_depend_on_threads() {
     let [rep, windows] = ["rep.npz", "windows.npz"].map(|name| scratch.arg(name));
     let fit = "signal fit @gallop-small --k 14 --l 12 --m 7 -o";
     must(&words(&format!("{fit} {rep}")));
+    // Windows of 13 frames.
+    let fit = "signal fit @gallop-small --k 12 --l 10 --m 7 -o";
     must(&words(&format!("{fit} {windows} --window 18")));
     for name in ["a.npz", "a.pc2", "frames"] {
         same_bytes(name, |out| words(&format!("convert @jelly-small {out}")));

@@ -11,7 +11,7 @@ from importlib.metadata import version
 import numpy as np
 import pymeshlab
 
-from wire import Unsupported, serve
+from wire import Unsupported, check_faces, serve
 
 
 def is_closed(F):
@@ -26,8 +26,7 @@ def prepare(stage, inputs):
     if stage != "mesh.quality":
         raise Unsupported(f"no stage {stage} here")
     frames, F = inputs["frames"], inputs["F"]
-    if F.size and (F.min() < 0 or F.max() >= frames.shape[1]):
-        raise ValueError("a face names a vertex that is not there")
+    check_faces(F, frames.shape[1])
     e1, e2 = frames[:, F[:, 1]] - frames[:, F[:, 0]], frames[:, F[:, 2]] - frames[:, F[:, 0]]
     if not np.cross(e1, e2).any(axis=2).all():
         raise Unsupported("a triangle of no area")

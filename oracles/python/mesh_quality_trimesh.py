@@ -8,15 +8,14 @@ import platform
 import numpy as np
 import trimesh
 
-from wire import Unsupported, serve
+from wire import Unsupported, check_faces, serve
 
 
 def prepare(stage, inputs):
     if stage != "mesh.quality":
         raise Unsupported(f"no stage {stage} here")
     frames, F = inputs["frames"], inputs["F"]
-    if F.size and (F.min() < 0 or F.max() >= frames.shape[1]):
-        raise ValueError("a face names a vertex that is not there")
+    check_faces(F, frames.shape[1])
     # What a mesh has computed it keeps: new meshes at every call, made of views.
     closed = trimesh.Trimesh(frames[0], F, process=False).is_watertight
 

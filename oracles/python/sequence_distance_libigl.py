@@ -6,15 +6,14 @@ from importlib.metadata import version
 import igl
 import numpy as np
 
-from wire import Unsupported, serve
+from wire import Unsupported, check_faces, serve
 
 
 def prepare(stage, inputs):
     if stage != "sequence.distance":
         raise Unsupported(f"no stage {stage} here")
     A, B, F = inputs["A"], inputs["B"], inputs["F"]
-    if F.min() < 0 or F.max() >= B.shape[1]:
-        raise ValueError("a face names a vertex that is not there")
+    check_faces(F, B.shape[1])
 
     def call():
         distances = np.sqrt([igl.point_mesh_squared_distance(a, b, F)[0] for a, b in zip(A, B)])

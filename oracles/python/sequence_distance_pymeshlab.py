@@ -8,7 +8,7 @@ from importlib.metadata import version
 import numpy as np
 import pymeshlab
 
-from wire import Unsupported, serve
+from wire import Unsupported, check_faces, serve
 
 
 def pair(A, B, F):
@@ -22,8 +22,7 @@ def prepare(stage, inputs):
     if stage != "sequence.distance":
         raise Unsupported(f"no stage {stage} here")
     A, B, F = inputs["A"], inputs["B"], inputs["F"]
-    if F.min() < 0 or F.max() >= B.shape[1]:
-        raise ValueError("a face names a vertex that is not there")
+    check_faces(F, B.shape[1])
     pairs = [pair(a, b, F) for a, b in zip(A, B)]
     boxes = np.ptp(np.concatenate([A, B], axis=1), axis=1)
     radii = [pymeshlab.PureValue(2 * np.linalg.norm(box) or 1.0) for box in boxes]

@@ -1,23 +1,34 @@
-"""shape.lengths_decode with scipy.sparse: Gauss-Newton with Levenberg's damping on the lengths and dihedral angles, analytic Jacobian, normal equations by
-SuperLU. It starts from the linear reconstruction of shape_lric_numpy.py with the stretches that the lengths give: where z is that of a frame, it starts at
-the answer.
+"""shape.lengths_decode with scipy.sparse: a trust region by conjugate gradients (Steihaug 1983) on the lengths, the dihedral angles and the terms of
+triangles below a tenth of their areas, with an analytic Jacobian J. The second derivatives are J^T J and differences of J along each direction, for
+Gauss-Newton's part alone creeps on vectors of no frame; J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of
+shape_lric_numpy.py with the stretches that the lengths give: where z is that of a frame, it starts at the answer.
 
-`seconds` is everything that depends on z. The damping never moves the minimum, and settles the motions that z leaves free, which the six numbers fix.
+`seconds` is everything that depends on z. The preconditioner's damping never moves the minimum, and settles the motions that z leaves free, which the six
+numbers fix.
 """
 
 import numpy as np
 from scipy import sparse
 
 from shape_lengths_numpy import Lengths
-from shape_mesh import Mesh, exp_rotation, norms, serve_version, solid_triangles, spd_factor
+from shape_mesh import Mesh, corners_to_edges, exp_rotation, norms, serve_version, solid_triangles, spd_factor
 from wire import Unsupported, serve
 
 STEPS = 200
-GRADIENT = 1e-9  # a vanishing gradient, in mean edge lengths and radians
+EXACT = 1e-12  # root mean square of the residuals, in mean edge lengths and radians, of a frame that has the numbers given
+STATIONARY = 1e-7  # cosine of the angle between the residuals and a column of the Jacobian, where no step halves it any more
+SUM_DIGITS = 1e-9  # below this part of the sum of squares, a decrease is told by the gradients at both ends
+DAMPING = 1e-6
+SLOW = 0.9  # a step that leaves more of the sum calls for second derivatives
+DIRECTIONS = 100  # of conjugate gradients, in a step
+STALE = 12  # directions in a step that call for a new preconditioner
+LEAST_AREA = 0.1  # of a triangle, in parts of the area that its given lengths make
+FLAT = 1e-5  # a triangle without height, in parts of the reference's: angles jump there, and the descent ends
 
 
 class Residual:
-    """Of all numbers of the edges, for coordinates y in mean edge lengths; column i of `given` order: lengths, then angles of solid pairs."""
+    """Of all numbers of the edges, and of the areas, for coordinates y in mean edge lengths; in the order of `given`: lengths, then angles of solid
+    pairs, then logarithms of the least areas of solid triangles, -inf where there is none."""
 
     def __init__(self, lengths):
         self.lengths, edges, mesh = lengths, lengths.edges, lengths.mesh
@@ -28,23 +39,49 @@ class Residual:
         self.o_f, self.o_g = opposite[edges.half_f[pairs]], opposite[edges.half_g[pairs]]
         self.turned = np.where(edges.alike[pairs], -1.0, 1.0)[:, None]
         stencil = np.column_stack([self.s, self.e, self.o_f, self.o_g])
-        E, P = len(self.i), len(self.s)
-        vertices = np.concatenate([np.column_stack([self.i, self.j]).ravel(), stencil.ravel()])
-        rows = np.concatenate([np.repeat(np.arange(E), 2), np.repeat(E + np.arange(P), 4)])
+        corners = mesh.F[mesh.solid]
+        counts = E, P, A = len(self.i), len(self.s), len(corners)
+        vertices = np.concatenate([np.column_stack([self.i, self.j]).ravel(), stencil.ravel(), corners.ravel()])
+        width = np.repeat([2, 4, 3], counts)
+        rows = np.repeat(np.arange(E + P + A), width)
 
-        graph = sparse.csr_matrix((np.ones(len(rows)), (rows, vertices)), (E + P, mesh.V))
+        graph = sparse.csr_matrix((np.ones(len(rows)), (rows, vertices)), (E + P + A, mesh.V))
         order = np.argsort(spd_factor((graph.T @ graph + 100 * E * sparse.eye(mesh.V)).tocsc()).perm_c)
         self.order = (3 * order[:, None] + np.arange(3)).ravel()
         columns = 3 * np.argsort(order)[vertices][:, None] + np.arange(3)
-        self.pattern = np.repeat(rows, 3), columns.ravel()
-        self.shape = (E + P, 3 * mesh.V)
+        self.pattern = columns.ravel(), np.concatenate([[0], np.cumsum(3 * width)])
+        self.shape = (E + P + A, 3 * mesh.V)
+        self.areas = slice(E + P, None)
+        self.reference_heights = self.heights(mesh.reference / lengths.unit)
 
-    def __call__(self, y, given):
-        """The residuals and their Jacobian (columns in `order`), or None where a triangle has collapsed."""
+    def vectors(self, d):
+        """(V,3) of a vector of the Jacobian's columns."""
+        v = np.empty(len(d))
+        v[self.order] = d
+        return v.reshape(-1, 3)
+
+    def heights(self, y):
+        """The least heights of the solid triangles."""
+        e1, e2, normal = corners_to_edges(y, self.lengths.mesh.F[self.lengths.mesh.solid])
+        return norms(normal) / np.maximum(np.maximum(norms(e1), norms(e2)), norms(e2 - e1))
+
+    def given(self, l, angles):
+        """The numbers given: l (E), of any sign, and the angles of all pairs."""
+        longest, middle, shortest = np.sort(np.maximum(l, 0)[self.lengths.edges.edge.reshape(-1, 3)[self.lengths.mesh.solid]]).T[::-1]
+        excess = shortest - (longest - middle)
+        made = excess > 0
+        factors = np.stack([longest + (middle + shortest), excess, shortest + (longest - middle), longest + (middle - shortest)])  # Kahan's, of Heron
+        logs = np.log(np.where(made, factors, 1)).sum(axis=0) / 2 - np.log(4)
+        return np.concatenate([l, angles[self.lengths.edges.solid], np.where(made, np.log(LEAST_AREA) + logs, -np.inf)])
+
+    def __call__(self, y, given, active=None):
+        """The residuals and their Jacobian (columns in `order`), or None where a triangle has collapsed. The triangles of which the Jacobian has rows other
+        than zero are `active`, else those below their least areas."""
         mesh, edges = self.lengths.mesh, self.lengths.edges
         try:
             normals = np.zeros((len(mesh.F), 3))
-            normals[mesh.solid] = solid_triangles(mesh, y)[2]
+            e1, e2, solid_normals = solid_triangles(mesh, y)
+            normals[mesh.solid] = solid_normals
         except Unsupported:
             return None
         chord = y[self.j] - y[self.i]
@@ -68,36 +105,121 @@ class Residual:
         angles = np.arctan2(sine, np.einsum("pi,pi->p", n[0], n[1]))
         by_angle = np.stack([parts[0][0] + parts[1][0], parts[0][1] + parts[1][1], parts[0][2], parts[1][2]], axis=1)
 
-        r = np.concatenate([length, angles]) - given
-        bends = r[len(length) :]
+        twice = norms(solid_normals)
+        small = np.maximum(given[self.areas] - np.log(twice / 2), 0)
+        across = np.stack([e1 - e2, e2, -e1], axis=1)  # from the corner before to the corner after, in the triangle's plane
+        by_area = np.cross(solid_normals[:, None], across) / np.square(twice)[:, None, None]
+        by_area[~(small > 0 if active is None else active)] = 0
+
+        bends = angles - given[len(length) : self.areas.start]
         bends -= 2 * np.pi * np.round(bends / (2 * np.pi))
-        values = np.concatenate([direction.ravel(), by_angle.ravel()])
-        return r, sparse.csr_matrix((values, self.pattern), self.shape)
+        r = np.concatenate([length - given[: len(length)], bends, small])
+        values = np.concatenate([direction.ravel(), by_angle.ravel(), by_area.ravel()])
+        return r, sparse.csr_matrix((values, *self.pattern), self.shape)
 
 
-def levenberg(residual, y, given):
-    damping, found = 1e-6, residual(y, given)
+class Point:
+    """Coordinates y, with the residuals r, their Jacobian J, the gradient g of half the sum of squares, and the greatest cosine between r and a column."""
+
+    def __init__(self, residual, y, given, found):
+        self.residual, self.y, self.given, (self.r, self.J) = residual, y, given, found
+        self.g = self.J.T @ self.r
+        columns = np.sqrt(np.asarray(self.J.power(2).sum(axis=0)).ravel())
+        scale = columns * np.linalg.norm(self.r)
+        self.cosine = np.max(np.abs(self.g) / np.where(scale > 0, scale, 1), initial=0.0)
+
+    def exact(self):
+        return self.r @ self.r <= EXACT**2 * len(self.r)
+
+    def flattest(self):
+        """The least height of a triangle, in parts of the reference's."""
+        return np.min(self.residual.heights(self.y) / self.residual.reference_heights, initial=np.inf)
+
+    def moved(self, d):
+        y = self.y + self.residual.vectors(d)
+        found = self.residual(y, self.given)
+        return None if found is None else Point(self.residual, y, self.given, found)
+
+    def preconditioner(self):
+        return spd_factor((self.J.T @ self.J + DAMPING * sparse.eye(len(self.g))).tocsc(), "NATURAL")
+
+    def hessian(self, d, curved):
+        """Times d. Gauss-Newton's J^T J, or where `curved` with the derivative of J by central differences that change no triangle by more than 1e-5 of
+        its height."""
+        if not curved:
+            return self.J.T @ (self.J @ d)
+        v = self.residual.vectors(d)
+        mesh = self.residual.lengths.mesh
+        change = norms(v[mesh.F[mesh.solid]]).max(axis=1) / self.residual.heights(self.y)
+        h = 1e-5 / change.max(initial=1e-300)
+        active = self.r[self.residual.areas] > 0
+        (_, ahead), (_, behind) = (self.residual(self.y + sign * h * v, self.given, active) for sign in (1, -1))
+        return self.J.T @ (self.J @ d) + (ahead.T @ self.r - behind.T @ self.r) / (2 * h)
+
+    def decrease(self, other, d):
+        """Of half the sum of squares, from here to `other` = self.moved(d); where rounding hides it, by the trapezoidal rule (after Hager & Zhang 2005)."""
+        decrease = (self.r - other.r) @ (self.r + other.r) / 2
+        return decrease if abs(decrease) > SUM_DIGITS * (self.r @ self.r) else -(self.g + other.g) @ d / 2
+
+
+def trust_region_step(point, curved, factor, radius, tolerance):
+    """The step d, its length in the preconditioner's norm, the decrease that it promises, and the number of directions (Conn, Gould & Toint, 7.5.1)."""
+    d, Hd, left = np.zeros((3, len(point.g)))
+    left = left + point.g
+    v = factor.solve(left)
+    size = first = left @ v
+    p, dd, dp, pp = -v, 0.0, 0.0, size
+    for count in range(1, DIRECTIONS + 1):
+        Hp = point.hessian(p, curved)
+        curvature = p @ Hp
+        step = size / curvature if curvature > 0 else np.inf
+        outside = curvature <= 0 or dd + step * (2 * dp + step * pp) >= radius**2
+        if outside:
+            step = (np.sqrt(dp**2 + pp * (radius**2 - dd)) - dp) / pp
+        d, Hd, left, dd = d + step * p, Hd + step * Hp, left + step * Hp, dd + step * (2 * dp + step * pp)
+        if outside:
+            break
+        v = factor.solve(left)
+        before, size = size, left @ v
+        if size <= tolerance**2 * first:
+            break
+        ratio = size / before
+        dp, pp = ratio * (dp + step * pp), size + ratio**2 * pp
+        p = -v + ratio * p
+    return d, np.sqrt(dd), -(point.g @ d + d @ Hd / 2), count
+
+
+def stationary(residual, y, given):
+    """Coordinates where the sum of squares is stationary to rounding, downhill from y."""
+    found = residual(y, given)
     if found is None:
-        raise ArithmeticError("the linear start has a collapsed triangle")
-    for _ in range(STEPS):
-        r, J = found
-        gradient, normal = J.T @ r, (J.T @ J).tocsc()
-        while True:
-            step = np.empty(len(gradient))
-            step[residual.order] = -spd_factor((normal + damping * sparse.eye(len(gradient))).tocsc(), "NATURAL").solve(gradient)
-            trial = y + step.reshape(-1, 3)
-            found = residual(trial, given)
-            if found is not None and found[0] @ found[0] < r @ r:
+        raise ArithmeticError("the linear start has a triangle without height")
+    point, curved, factor, radius = Point(residual, y, given, found), False, None, None
+    for step in range(STEPS):
+        if point.exact() or point.cosine == 0:
+            return point.y
+        if factor is None:
+            factor = point.preconditioner()
+            radius = radius or np.sqrt(point.g @ factor.solve(point.g))  # at first the length of Gauss-Newton's step
+        d, length, promised, count = trust_region_step(point, curved, factor, radius, np.clip(np.sqrt(point.cosine), 0.01, 0.1))
+        trial = point.moved(d)
+        gain = -1.0 if trial is None else point.decrease(trial, d) / promised
+        if point.cosine <= STATIONARY and (trial is None or trial.cosine > point.cosine / 2):
+            return point.y
+        if gain < 0.25:
+            radius = length / 4
+        elif gain > 0.75:
+            radius = max(radius, 2 * length)
+        curved = curved or trial is None or trial.r @ trial.r > SLOW * (point.r @ point.r)
+        if gain > 0:
+            point, factor = trial, factor if count <= STALE else None
+            if point.flattest() <= FLAT:
                 break
-            damping *= 10
-            if damping > 1e6 or np.abs(gradient).max(initial=0) <= GRADIENT:
-                if np.abs(gradient).max(initial=0) > GRADIENT:
-                    raise ArithmeticError(f"no descent, gradient {np.abs(gradient).max():.1e}")
-                return y
-        y, damping = trial, max(damping / 10, 1e-12)
-        if np.abs(step).max() <= 1e-14 * np.abs(y).max():
-            return y
-    raise ArithmeticError(f"gradient {np.abs(gradient).max():.1e} after {STEPS} steps")
+        elif np.abs(d).max() <= np.finfo(float).eps * np.abs(point.y).max():
+            break
+    flattest = point.flattest()
+    reason = "the descent ends at a triangle without height" if flattest <= FLAT else "no stationary frame is reached"
+    raise ArithmeticError(f"{reason}: cosine {point.cosine:.1e} after {step + 1} steps, the flattest at {flattest:.1e} of its height in the reference")
 
 
 class Decoder:
@@ -121,8 +243,7 @@ class Decoder:
         lengths, mesh, lric = self.lengths, self.mesh, self.lric
         l, angles, six = z[lengths.length_slot], z[lengths.pair_slot], z[lengths.size :].reshape(-1, 6)
         x = self.start(self.stretches(l * lengths.unit), angles, six)
-        given = np.concatenate([l, angles[lengths.edges.solid]])
-        x = lengths.unit * levenberg(self.residual, x / lengths.unit, given)
+        x = lengths.unit * stationary(self.residual, x / lengths.unit, self.residual.given(l, angles))
         turned = lric.triangle_frames(x)[1][lric.roots]
         turn = np.tile(np.eye(3), (mesh.C, 1, 1))
         turn[lric.rooted] = exp_rotation(six[lric.rooted, :3]) @ lric.B0[lric.roots] @ turned.transpose(0, 2, 1)

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
-from wire import Unsupported
+from wire import Unsupported, check_faces
 
 RT2 = np.sqrt(2)
 
@@ -38,10 +38,9 @@ def unit(v):
 
 class Mesh:
     def __init__(self, reference, F):
-        if reference.ndim != 2 or reference.shape[1] != 3 or F.ndim != 2 or F.shape[1] != 3:
-            raise ValueError("reference is (V,3) and F is (F,3)")
-        if F.dtype.kind != "i" or F.size and (F.min() < 0 or F.max() >= len(reference)):
-            raise ValueError("a face names a vertex that is not there")
+        if reference.ndim != 2 or reference.shape[1] != 3:
+            raise ValueError("reference is (V,3)")
+        check_faces(F, len(reference))
         if not np.isfinite(reference).all():
             raise ValueError("the reference is not finite")
         self.reference, self.F, self.V = reference, F, len(reference)

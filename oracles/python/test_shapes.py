@@ -275,6 +275,92 @@ def test_lengths_decode(rng):
         close("shape_lengths_scipy: angles that cannot be leave lengths alone where all angles pull alike", sizes, np.full(6, np.sqrt(8)), 1e-8)
 
 
+def sheet(cells, angle, squeeze=1.0):
+    """A square of unit squares, two triangles each, rolled as a strip is; squeezed along the roll's axis."""
+    row = strip(cells, angle)[0][::2]
+    x = (row[:, None] + squeeze * np.arange(cells + 1)[:, None] * [0, 1, 0]).reshape(-1, 3)
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).reshape(-1, 1)
+    beyond = corner + cells + 1
+    return x, np.concatenate([np.hstack([corner, beyond, beyond + 1]), np.hstack([corner, beyond + 1, corner + 1])])
+
+
+def across(cells, angle, squeeze=1.0):
+    """The vertices of a sheet rolled about its other axis."""
+    x = sheet(cells, angle)[0].reshape(cells + 1, cells + 1, 3).transpose(1, 0, 2).reshape(-1, 3)
+    return x[:, [1, 0, 2]] * [1, squeeze, 1]
+
+
+def areas(x, F):
+    """Of triangles, in frames (...,V,3)."""
+    a, b, c = (x[..., corner, :] for corner in F.T)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
+
+
+def shortfalls(inputs, z, x):
+    """(n,F) of frames (n,V,3): the logarithm of a tenth of the area that a triangle's lengths in z make, by Heron's formula, over its own; at least 0."""
+    edges = {tuple(edge): i for i, edge in enumerate(edge_list(inputs["F"]).tolist())}
+    sides = [[z[2 * edges[tuple(sorted(side))]] for side in ((a, b), (b, c), (c, a))] for a, b, c in inputs["F"].tolist()]
+    sides = np.array(sides) * mean_length(inputs["reference"], inputs["F"])
+    half = sides.sum(axis=1) / 2
+    given = np.sqrt(half * (half[:, None] - sides).prod(axis=1))
+    return np.maximum(0, np.log(0.1 * given / areas(x, inputs["F"])))
+
+
+def cosines(encoder, inputs, z, x, h, with_areas=True):
+    """Between what a decoder makes small at x, the numbers of x less z and the shortfalls of areas, and what each coordinate changes of it, by central
+    differences; and the root of the sum of squares."""
+    numbers = 2 * len(edge_list(inputs["F"]))
+
+    def terms(frames):
+        return np.hstack([encoder.run(**inputs, frames=frames)["z"][:, :numbers] - z[:numbers], with_areas * shortfalls(inputs, z, frames)])
+
+    moves = h * np.eye(x.size).reshape(-1, *x.shape)
+    off, J = terms(x[None])[0], (terms(x + moves) - terms(x - moves)) / (2 * h)
+    return np.abs(J @ off) / (np.linalg.norm(J, axis=1) * np.linalg.norm(off)), np.linalg.norm(off)
+
+
+def test_lengths_means():
+    with Oracle("shape_lengths_numpy", "shape.lengths_encode") as encoder, Oracle("shape_lengths_scipy", "shape.lengths_decode") as decoder:
+        flat, F = strip(6)
+        z = encoder.run(reference=flat, F=F, frames=np.array([strip(6, 0.4)[0], strip(6, 1.0)[0]]))["z"].mean(axis=0)
+        middle = rigid(strip(6, 0.7)[0], [0, 0, 0], z[-3:] * diagonal(flat) - strip(6, 0.7)[0].mean(axis=0))
+        close("shape_lengths_scipy: the mean of two rolls is the roll between", decoder.run(reference=flat, F=F, z=z[None])["frames"], [middle], 1e-10)
+
+        cases = ("", 1.0, 0.5, 1e-5, 1e-8), (", of needles", 1e-3, 0.02, 1e-8, 1e-6), (", of needles bent more", 1e-3, 0.2, 1e-9, 1e-5)
+        for name, squeeze, angle, h, near in cases:
+            flat, F = sheet(4, 0.0, squeeze)
+            frames = np.array([sheet(4, angle, squeeze)[0], across(4, angle, squeeze)])
+            inputs = {"reference": flat, "F": F}
+            z = encoder.run(**inputs, frames=frames)["z"].mean(axis=0)
+            x = decoder.run(**inputs, z=z[None])["frames"][0]
+            found, size = cosines(encoder, inputs, z, x, h)
+            check(f"shape_lengths_scipy: the mean of two rolls across each other is of no frame{name}", size > 1e-4, f"{size:.2g}")
+            close(f"shape_lengths_scipy: it decodes to a stationary frame{name}", found, np.zeros(x.size), near)
+            moved = x + 1e-3 * squeeze * np.sin(np.arange(x.size)).reshape(x.shape)
+            check(f"shape_lengths_scipy: a frame beside it is not stationary{name}", cosines(encoder, inputs, z, moved, h)[0].max() > 1e3 * near)
+
+        held = np.count_nonzero(shortfalls(inputs, z, x[None]))
+        check("shape_lengths_scipy: needles bent more would fall below a tenth of their areas", held > 0, f"{held} held")
+        check("shape_lengths_scipy: they keep an area", areas(x, F).min() > 1e-2 * areas(flat, F).min())
+
+        flat, F = TETRAHEDRON[0] * [1, 1, 0.05], TETRAHEDRON[1]
+        inputs = {"reference": flat, "F": F}
+        z = encoder.run(**inputs, frames=flat[None])["z"][0]
+        z[1:12:2] += 2 * np.sin(7.0 * np.arange(6))  # angles that no tetrahedron has
+        x = decoder.run(**inputs, z=z[None])["frames"][0]
+        held = shortfalls(inputs, z, x[None]).max()
+        check("shape_lengths_scipy: angles that cannot be push a triangle below a tenth of its area", held > 1e-3, f"{held:.1e}")
+        found = cosines(encoder, inputs, z, x, 1e-6)[0]
+        close("shape_lengths_scipy: with its term the frame is stationary", found, np.zeros(x.size), 1e-7)
+        free = cosines(encoder, inputs, z, x, 1e-6, with_areas=False)[0].max()
+        check("shape_lengths_scipy: without it, not", free > 1e-3, f"{free:.1e}")
+
+        right = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        z = np.array([[3.0, 0, 1, 0, 1, 0, *np.zeros(6)]])  # no triangle: it has no area to keep
+        reply = decoder.request(reference=right, F=np.array([[0, 1, 2]]), z=z)
+        check("shape_lengths_scipy: a triangle without height is an error", reply["status"] == "error" and "without height" in reply["message"])
+
+
 def book_frames():
     x0, F = book(0, 0.9, -1.2)
     return {"reference": x0, "F": F}, np.array([book(0.3, 1.0, -2.0)[0], rigid(x0, SPIN, SHIFT)])
@@ -368,5 +454,6 @@ def run(rng):
     test_gradient(rng)
     test_lengths_encode(rng)
     test_lengths_decode(rng)
+    test_lengths_means()
     test_lric(rng)
     test_patch(rng)

@@ -25,6 +25,14 @@ class Unsupported(Exception):
     """Raised by prepare() or call() where the library has not got the stage for these inputs."""
 
 
+def check_faces(F, vertices):
+    """An error unless F is (F,3) and names vertices that are there."""
+    if F.ndim != 2 or F.shape[1] != 3 or F.dtype.kind != "i":
+        raise ValueError("F is (F,3), of whole numbers")
+    if F.size and (F.min() < 0 or F.max() >= vertices):
+        raise ValueError("a face names a vertex that is not there")
+
+
 def _read_exactly(stream, count):
     data = stream.read(count)
     if len(data) != count:

@@ -1,13 +1,14 @@
 //! `info SEQ`: counts, measures and defects.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::output::{check_place, draft_json, say};
+use super::output::{Draft, check_place, draft_json, say};
 use super::{FrameChoice, Outcome};
-use crate::mesh::measure::{bounds, counts, measure_frames};
+use crate::mesh::measure::{Measures, bounds, counts, measure_frames};
+use crate::mesh::self_intersections::{SelfIntersections, self_intersections_of_frames};
 
 #[derive(Args)]
 pub struct Info {
@@ -18,16 +19,20 @@ pub struct Info {
     /// Write the numbers to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Find where the surface meets itself, and write area, volume and self-intersections of every frame to this file
+    #[arg(long, value_name = "FILE")]
+    quality: Option<PathBuf>,
 }
 
 impl Info {
     pub fn run(self) -> Outcome {
         self.json.as_deref().map_or(Ok(()), check_place)?;
+        self.quality.as_deref().map_or(Ok(()), check_place)?;
         let sequence = self.frames.open(&self.sequence)?;
         let mesh = sequence.connectivity();
         let c = counts(mesh.vertex_count(), mesh.faces());
         let measures = measure_frames(sequence.positions(), sequence.dimension(), mesh.faces());
-        let range = |of: fn(&crate::mesh::measure::Measures) -> f64| {
+        let range = |of: fn(&Measures) -> f64| {
             let values = || measures.iter().map(of);
             [
                 values().fold(f64::INFINITY, f64::min),
@@ -45,8 +50,17 @@ impl Info {
             "area": area, "volume": volume,
             "bounds": {"min": first.min, "max": first.max}, "diagonal": first.diagonal(),
         });
-        if let Some(path) = &self.json {
-            draft_json(path, &value)?.keep()?;
+        let (x, d) = (sequence.positions(), sequence.dimension());
+        let quality = self.quality.as_deref();
+        let quality = quality.map(|path| (path, self_intersections_of_frames(x, d, mesh.faces())));
+        let json = self.json.as_deref().map(|path| draft_json(path, &value));
+        let json = json.transpose()?;
+        let rows = |(path, meetings): &(&Path, Vec<SelfIntersections>)| {
+            Draft::new(path, &table(&measures, meetings))
+        };
+        let rows = quality.as_ref().map(rows).transpose()?;
+        for draft in json.into_iter().chain(rows) {
+            draft.keep()?;
         }
         say(&format!(
             "{}: {} frames, V = {}, F = {}, E = {}, d = {}",
@@ -75,6 +89,36 @@ impl Info {
             first.max,
             first.diagonal()
         ));
+        if let Some((_, meetings)) = &quality {
+            say(&most_of(meetings));
+        }
         Ok(true)
+    }
+}
+
+const COLUMNS: &str =
+    "frame,area,volume,self_intersections,intersecting_faces,faces_without_area\n";
+
+/// A row a frame.
+fn table(measures: &[Measures], meetings: &[SelfIntersections]) -> String {
+    let rows = (1..).zip(measures.iter().zip(meetings));
+    let rows = rows.map(|(frame, (m, at))| {
+        let [pairs, faces, flat] = [at.pairs, at.faces.len(), at.without_area.len()];
+        format!("{frame},{},{},{pairs},{faces},{flat}\n", m.area, m.volume)
+    });
+    COLUMNS.to_owned() + &rows.collect::<String>()
+}
+
+/// In how many frames the surface meets itself, and the first of those where most triangles do.
+fn most_of(meetings: &[SelfIntersections]) -> String {
+    let meeting = (1..).zip(meetings).filter(|(_, at)| !at.faces.is_empty());
+    let frames = meeting.clone().count();
+    match meeting.max_by_key(|(frame, at)| (at.faces.len(), std::cmp::Reverse(*frame))) {
+        None => "the surface meets itself in no frame".to_owned(),
+        Some((frame, at)) => format!(
+            "the surface meets itself in {frames} frames, most in frame {frame}: {} triangles, {} pairs without a common vertex",
+            at.faces.len(),
+            at.pairs
+        ),
     }
 }

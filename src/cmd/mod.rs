@@ -61,7 +61,9 @@ enum Verb {
     #[command(after_help = "Example: meshseq data --data ~/meshes")]
     Data(data::Data),
     /// What a sequence is: counts, measures, defects
-    #[command(after_help = "Example: meshseq info @gallop-small --json info.json")]
+    #[command(
+        after_help = "Example: meshseq info @gallop-small --json info.json --quality quality.csv"
+    )]
     Info(info::Info),
     /// A sequence in another format
     #[command(after_help = "Example: meshseq convert @gallop-small gallop.npz")]

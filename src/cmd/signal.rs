@@ -100,7 +100,7 @@ pub struct FitVerb {
     /// Choose k, l, m for this relative RMS error, such as 0.01
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
     tolerance: Option<f64>,
-    /// Shape space: vertex, gradient, lric or patch
+    /// Shape space: vertex, gradient, lric, lengths or patch
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// The shape space's reference frame, one OBJ of the same mesh; the first frame if not given

@@ -11,7 +11,7 @@ use crate::signal::leave_out::{LeaveOut, LeaveOutError, Split, TradeOff};
 use crate::signal::refine::RefineOptions;
 
 const NAME: &str = "leave-out";
-/// Shown always, and in `gradient` as well.
+/// Shown always.
 const EMBEDDED: [&str; 2] = ["@gallop", "@jelly"];
 /// Shown where there is the data: the sequence and how many of its frames are taken.
 const REAL: [(&str, usize); 3] = [("horse-gallop", 23), ("cow", 203), ("samba", usize::MAX)];
@@ -28,9 +28,7 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let mut datasets = Vec::new();
     for name in EMBEDDED {
         let sequence = open(name)?;
-        for kind in [SpaceKind::Vertex, SpaceKind::Gradient] {
-            rows.push(row(name, &sequence, kind)?);
-        }
+        rows.extend(both(name, &sequence)?);
         panels.push(Panel::Chart(trade_off(name, &sequence)?));
         datasets.push(name.to_owned());
     }
@@ -42,7 +40,7 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
         let frames = &sequence.positions()[..count * sequence.dimension()];
         let sequence = Sequence::new(sequence.connectivity().clone(), count, frames.to_vec())
             .map_err(ExhibitError::of(NAME))?;
-        rows.push(row(name, &sequence, SpaceKind::Vertex)?);
+        rows.extend(both(name, &sequence)?);
         datasets.push(name.to_owned());
     }
     panels.insert(0, Panel::Table(table(rows)));
@@ -56,6 +54,11 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
         datasets,
         panels,
     })
+}
+
+fn both(name: &str, sequence: &Sequence) -> Result<[Vec<String>; 2], ExhibitError> {
+    let row = |kind| row(name, sequence, kind);
+    Ok([row(SpaceKind::Vertex)?, row(SpaceKind::Gradient)?])
 }
 
 fn row(name: &str, sequence: &Sequence, kind: SpaceKind) -> Result<Vec<String>, ExhibitError> {

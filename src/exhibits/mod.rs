@@ -2,8 +2,9 @@
 //!
 //! | file | what it shows |
 //! |---|---|
-//! | [`gallop`], [`control`], [`flag`] | Figures 1, 2 and 4 |
+//! | [`gallop`], [`control`], [`saddle`], [`flag`] | Figures 1 to 4 |
 //! | [`editing`], [`resampling`], [`transfer`], [`expressions`] | Figures 5 to 8 |
+//! | [`round_trip`] | every frame through every shape space and back (section 5) |
 //! | [`large_turns`] | halfway to a roll by up to 700 degrees, in every shape space (section 5) |
 //! | [`leave_out`] | in-betweens by layout, staged and refined (section 6) |
 //! | [`signals`] | curves and frames that several of them show |
@@ -18,6 +19,8 @@ pub mod large_turns;
 pub mod leave_out;
 pub mod render;
 pub mod resampling;
+pub mod round_trip;
+pub mod saddle;
 pub mod signals;
 pub mod transfer;
 
@@ -65,7 +68,23 @@ pub struct Chart {
     pub equal: bool,
     /// Whether y is logarithmic.
     pub logarithmic: bool,
+    /// Drawn behind the lines, which are cut to it; all of them are shown where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground: Option<Ground>,
     pub lines: Vec<Line>,
+}
+
+/// Cells that cover the plane of a chart, each of one of a few kinds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ground {
+    /// The lower left and the upper right corner.
+    pub corners: [[f64; 2]; 2],
+    /// Cells across.
+    pub across: usize,
+    /// Row by row from the lowest, a digit each: the kind, 0 for what is left white.
+    pub cells: String,
+    /// The kinds from 1 on.
+    pub kinds: Vec<String>,
 }
 
 /// How a line is drawn.
@@ -127,11 +146,13 @@ pub type Make = fn(&DataFolders) -> Result<Exhibit, ExhibitError>;
 pub const ALL: &[(&str, Make)] = &[
     ("figure-1", gallop::exhibit),
     ("figure-2", control::exhibit),
+    ("figure-3", saddle::exhibit),
     ("figure-4", flag::exhibit),
     ("figure-5", editing::exhibit),
     ("figure-6", resampling::exhibit),
     ("figure-7", transfer::exhibit),
     ("figure-8", expressions::exhibit),
+    ("round-trip", round_trip::exhibit),
     ("large-turns", large_turns::exhibit),
     ("leave-out", leave_out::exhibit),
 ];

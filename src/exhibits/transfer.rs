@@ -1,7 +1,5 @@
 //! Figure 7: a gallop moved to another animal by eight examples, in two shape spaces.
 
-use faer::MatRef;
-
 use super::render::{MARKED, PLAIN, View};
 use super::signals::poses;
 use super::{Exhibit, ExhibitError, Panel, Table};
@@ -12,7 +10,7 @@ use crate::sequence::dataset::{DataFolders, open};
 use crate::shape::{Space, SpaceKind, decode_all, encode_examples, prepare_for};
 use crate::signal::in_space::sample_in_space;
 use crate::signal::knots::KnotRule;
-use crate::signal::transfer::{ExampleBasis, encode_motion, frames_of_coordinates, replace_shape};
+use crate::signal::transfer::{ExampleBasis, frames_of_coordinates, transfer_motion};
 
 const NAME: &str = "figure-7";
 /// Frames of the gallop, control points and sites, as in the paper.
@@ -100,26 +98,9 @@ fn given(data: &DataFolders) -> Result<Given, ExhibitError> {
     Ok(Given {
         names: ["horse-gallop", "horse-poses", "elephant-poses"],
         motion: data.sequence("horse-gallop")?,
-        source: examples(data, "horse-poses")?,
-        target: examples(data, "elephant-poses")?,
+        source: data.examples("horse-poses", EXAMPLES)?,
+        target: data.examples("elephant-poses", EXAMPLES)?,
     })
-}
-
-/// The reference pose of a mesh and the first of its others.
-fn examples(data: &DataFolders, name: &str) -> Result<Sequence, ExhibitError> {
-    let poses = data.sequence(name)?;
-    let count = (EXAMPLES - 1).min(poses.frame_count());
-    let file = format!("{name}.obj");
-    let rest = data.files("rest-poses")?;
-    let rest = rest.iter().find(|path| path.ends_with(&file));
-    let mut positions = match rest {
-        Some(path) => open(&path.display().to_string())?.positions().to_vec(),
-        None => Vec::new(),
-    };
-    positions.extend(&poses.positions()[..count * poses.dimension()]);
-    let frames = positions.len() / poses.dimension();
-    let sequence = Sequence::new(poses.connectivity().clone(), frames, positions);
-    sequence.map_err(ExhibitError::of(NAME))
 }
 
 struct Moved {
@@ -134,26 +115,15 @@ fn moved(given: &Given, n: usize, kind: SpaceKind) -> Result<Moved, ExhibitError
         space.map_err(ExhibitError::of(NAME))
     };
     let (from, to) = (prepared(&given.source)?, prepared(&given.target)?);
-    let examples = |space: &dyn Space, poses: &Sequence| {
-        encode_examples(space, poses.positions()).map_err(ExhibitError::of(NAME))
-    };
-    let (q, r) = (
-        examples(&*from, &given.source)?,
-        examples(&*to, &given.target)?,
-    );
-    let basis = ExampleBasis::new(q.as_ref()).map_err(ExhibitError::of(NAME))?;
     let frames = &given.motion.positions()[..n * given.motion.dimension()];
-    let z = encode_motion(&*from, given.source.frame(0), &basis, frames);
-    let z = z.map_err(ExhibitError::of(NAME))?;
-    let fit = basis.fit(
-        z.as_ref(),
-        CONTROL.min(n + 2),
-        SITES.min(n),
+    let over = transfer_motion(
+        frames,
+        [&*from, &*to],
+        [given.source.positions(), given.target.positions()],
+        (CONTROL.min(n + 2), SITES.min(n)),
         KnotRule::Literal,
-        &[],
     );
-    let fit = fit.map_err(ExhibitError::of(NAME))?;
-    let over = replace_shape(fit.representation, r.as_ref()).map_err(ExhibitError::of(NAME))?;
+    let over = over.map_err(ExhibitError::of(NAME))?;
     let sample =
         |times: &[f64]| sample_in_space(&*to, &over, times).map_err(ExhibitError::of(NAME));
     let every: Vec<f64> = (1..=n).map(|i| i as f64).collect();
@@ -163,21 +133,22 @@ fn moved(given: &Given, n: usize, kind: SpaceKind) -> Result<Moved, ExhibitError
     let newly = orientation.newly_turned(&sample(&every)?, &before);
     Ok(Moved {
         shown: sample(&SHOWN)?,
-        example_error: example_error(given, &basis, q.as_ref(), r.as_ref(), &*to)?,
+        example_error: example_error(given, &*from, &*to)?,
         turned: newly.iter().map(Vec::len).sum(),
     })
 }
 
 /// The examples of the source, as frames, moved to the target: how far vertices are from its examples, over the diagonal.
-fn example_error(
-    given: &Given,
-    basis: &ExampleBasis,
-    q: MatRef<'_, f64>,
-    r: MatRef<'_, f64>,
-    to: &dyn Space,
-) -> Result<f64, ExhibitError> {
-    let x = basis.coordinates(q).map_err(ExhibitError::of(NAME))?;
-    let moved = frames_of_coordinates(x.as_ref(), r);
+fn example_error(given: &Given, from: &dyn Space, to: &dyn Space) -> Result<f64, ExhibitError> {
+    let examples = |space: &dyn Space, poses: &Sequence| {
+        encode_examples(space, poses.positions()).map_err(ExhibitError::of(NAME))
+    };
+    let (q, r) = (examples(from, &given.source)?, examples(to, &given.target)?);
+    let basis = ExampleBasis::new(q.as_ref()).map_err(ExhibitError::of(NAME))?;
+    let x = basis
+        .coordinates(q.as_ref())
+        .map_err(ExhibitError::of(NAME))?;
+    let moved = frames_of_coordinates(x.as_ref(), r.as_ref());
     let moved = moved.map_err(ExhibitError::of(NAME))?;
     let frames = decode_all(to, moved.as_ref()).map_err(ExhibitError::of(NAME))?;
     let gaps = frames
@@ -186,4 +157,22 @@ fn example_error(
         .map(|(a, b)| (a - b).abs());
     let diagonal = bounds(given.target.frame(0)).diagonal();
     Ok(gaps.fold(0.0, f64::max) / diagonal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn examples_turn_into_their_partners_and_no_face_inside_out() {
+        let exhibit = exhibit(&DataFolders::new(Some("no data".as_ref()))).unwrap();
+        let Some(Panel::Table(table)) = exhibit.panels.last() else {
+            panic!("the last panel is no table");
+        };
+        for row in &table.rows {
+            assert!(row[1].parse::<f64>().unwrap() < 1e-9, "{row:?}");
+        }
+        let gradient = table.rows.iter().find(|row| row[0] == "gradient").unwrap();
+        assert_eq!(gradient[2], "0");
+    }
 }

@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::tolerance::{self, Tolerance};
 use crate::shape::SpaceKind;
 use crate::signal::knots::KnotRule;
-use crate::stages::{self, Stage, signal::Choice};
+use crate::stages::{self, Stage, made::Made, signal::Choice};
 
 /// One case, validated.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct Case {
     pub dataset: String,
     /// 1-based frames, first, last and step; none for all.
     pub frames: Frames,
+    /// What is made of these frames, of which the stage's inputs are then taken.
+    pub made: Made,
     pub choice: Choice,
     /// Expected quantities of the Rust answer, as printed: half a unit of the last digit is the tolerance.
     pub expect: BTreeMap<String, Printed>,
@@ -101,6 +103,9 @@ struct Entry {
     knots: Option<String>,
     space: Option<String>,
     #[serde(default)]
+    resampled: bool,
+    examples: Option<[String; 2]>,
+    #[serde(default)]
     pins: usize,
     #[serde(default)]
     expect: BTreeMap<String, String>,
@@ -112,6 +117,8 @@ struct Entry {
     measure: bool,
     #[serde(default)]
     draw: bool,
+    #[serde(default = "yes")]
+    means: bool,
     published: Option<Published>,
 }
 
@@ -135,6 +142,10 @@ struct Published {
 
 fn one() -> usize {
     1
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn two_minutes() -> u64 {
@@ -226,6 +237,7 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
         name: format!("{prefix}/{}", entry.name),
         stage: stage.name,
         frames: frames(entry.frames.as_deref(), entry.every)?,
+        made: made(stage, entry.resampled, entry.examples)?,
         choice: Choice {
             k: entry.k.unwrap_or(4),
             l: entry.l.unwrap_or(3),
@@ -233,6 +245,7 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
             knots: knots(entry.knots.as_deref())?,
             pins: entry.pins,
             space: space(entry.space.as_deref())?,
+            means: entry.means,
         },
         expect: expectations(&entry.expect)?,
         tolerances: tolerances(stage.name, entry.check)?,
@@ -242,6 +255,21 @@ fn validate(entry: Entry, prefix: &str) -> Result<Case, String> {
         published: entry.published.map(|p| (p.milliseconds / 1e3, p.source)),
         dataset: entry.dataset,
     })
+}
+
+fn made(stage: &Stage, resampled: bool, examples: Option<[String; 2]>) -> Result<Made, String> {
+    let made = match (resampled, examples) {
+        (true, Some(_)) => {
+            return Err("resampled and transferred by examples; expected one of both".into());
+        }
+        (true, None) => Made::Resampled,
+        (false, Some(examples)) => Made::Transferred { examples },
+        (false, None) => Made::Nothing,
+    };
+    match stage.name == "sequence.read" && made != Made::Nothing {
+        true => Err("sequence.read reads the files of its dataset; nothing is made of them".into()),
+        false => Ok(made),
+    }
 }
 
 fn knots(rule: Option<&str>) -> Result<KnotRule, String> {

@@ -43,6 +43,19 @@ faults! {
         Outputs(|_, out| numbers(out, "hausdorff", stretch));
     "distance-squared" in "sequence.distance": "mean of squared distances",
         Outputs(|_, out| numbers(out, "mean", |m| m.iter_mut().for_each(|x| *x *= *x)));
+    "quality-relative" in "mesh.quality": "areas a millionth too large",
+        Outputs(|_, out| numbers(out, "area", stretch));
+    "quality-inside-out" in "mesh.quality": "the sign of the volumes",
+        Outputs(|_, out| numbers(out, "volume", |v| v.iter_mut().for_each(|x| *x = -*x)));
+    "quality-pair" in "mesh.quality": "one pair more in the last frame",
+        Outputs(|_, out| integers(out, "intersections", |p| { let at = p.len() - 1; p[at] += 1; }));
+    "quality-face" in "mesh.quality": "one triangle fewer in the frame where most meet",
+        Outputs(|_, out| integers(out, "intersecting_faces", |f| if let Some(most) = f.iter_mut().max() { *most -= 1; }));
+    "quality-wrong-frame" in "mesh.quality": "the first frame in place of the second",
+        Inputs(|inputs| {
+            let d = inputs.f64("frames", 3).map_or(0, |(shape, _)| 3 * shape[1]);
+            numbers(inputs, "frames", |x| x.copy_within(..d, d));
+        });
     "gradient-transposed" in "shape.gradient_encode": "rotations the other way round",
         Outputs(|inputs, out| each_triangle(inputs, out, |numbers| numbers[..3].iter_mut().for_each(|x| *x = -*x)));
     "gradient-relative" in "shape.gradient_encode": "stretches a millionth too large",
@@ -72,6 +85,22 @@ faults! {
     "lric-wrong-frame" in "shape.lric_decode": "the first two frames swapped",
         Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
     "lric-frames" in "shape.lric_decode": "the vertices a millionth too far out",
+        Outputs(|_, out| numbers(out, "frames", stretch));
+    "lengths-relative" in "shape.lengths_encode": "every number a millionth too large",
+        Outputs(|_, out| numbers(out, "z", stretch));
+    "lengths-inside-out" in "shape.lengths_encode": "the surface bent the other way: the sign of every angle",
+        Outputs(|inputs, out| {
+            let edges = crate::mesh::topology::Topology::new(&inputs.triangles("F").unwrap_or_default()).fans().count();
+            let d = row_length(out, "z");
+            numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[..2 * edges].chunks_mut(2).for_each(|e| e[1] = -e[1])));
+        });
+    "lengths-turn-dropped" in "shape.lengths_encode": "components without their rotation",
+        Outputs(|_, out| { let d = row_length(out, "z"); numbers(out, "z", |z| z.chunks_mut(d).for_each(|row| row[d - 6..d - 3].fill(0.0))) });
+    "lengths-bent" in "shape.lengths_decode": "the edges of the last frame bent a millionth more",
+        Inputs(|inputs| last_frame(inputs, |z| { let edges = z.len() / 2 - 3; z[..2 * edges].chunks_mut(2).for_each(|e| e[1] *= 1.0 + SLIGHT) }));
+    "lengths-wrong-frame" in "shape.lengths_decode": "the first two frames swapped",
+        Inputs(|inputs| { let d = row_length(inputs, "z"); numbers(inputs, "z", |z| swap_rows(z, d, 0, 1)) });
+    "lengths-frames" in "shape.lengths_decode": "the vertices a millionth too far out",
         Outputs(|_, out| numbers(out, "frames", stretch));
     "poisson-entry" in "shape.poisson_factor": "the last entry of the matrix twice",
         Inputs(|inputs| numbers(inputs, "values", |v| { let at = v.len() - 1; v[at] *= 2.0 }));
@@ -237,6 +266,16 @@ faults! {
         Inputs(|inputs| { let (d, e) = (row_length(inputs, "Q"), row_length(inputs, "R")); shorten(inputs, "Q", d); shorten(inputs, "R", e) });
     "transfer-frames" in "signal.transfer": "frames a millionth too large",
         Outputs(|_, out| numbers(out, "W", stretch));
+    "refine-unfinished" in "signal.refine": "the best g and h for the start's curve, which stays",
+        Inputs(|inputs| integers(inputs, "iterations", |steps| steps[0] = 0));
+    "refine-staged" in "signal.refine": "a site a thousandth off, g and h as they were",
+        Outputs(|_, out| numbers(out, "sites", |s| s[0] *= 1.001));
+    "refine-weights" in "signal.refine": "frames between frames weighted as frames",
+        Inputs(|inputs| numbers(inputs, "w", |w| w.fill(1.0)));
+    "refine-claim" in "signal.refine": "the error claimed a millionth too small",
+        Outputs(|_, out| numbers(out, "error", |e| e[0] *= 1.0 - SLIGHT));
+    "refine-dimension-dropped" in "signal.refine": "the last shape coordinate of g at 0",
+        Outputs(|_, out| zero_last_column(out, "g"));
     "signal-other-knots" in "signal": "the other averaging rule",
         Inputs(other_rule);
     "signal-site-dropped" in "signal": "one site fewer",

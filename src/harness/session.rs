@@ -16,6 +16,7 @@ use crate::arrays::Bundle;
 use crate::sequence::Sequence;
 use crate::sequence::dataset::{DataFolders, DatasetError};
 use crate::sequence::format::{FormatError, frame_files, write};
+use crate::stages::made::{MadeError, make};
 use crate::stages::{self, StageError};
 
 /// What a run is to do.
@@ -225,6 +226,14 @@ impl Session {
         let chosen = sequence
             .select(&indices)
             .map_err(|e| wrong(e.to_string()))?;
+        let made = make(&case.made, chosen, &case.choice, &self.options.data);
+        let chosen = made.map_err(|error| match error {
+            MadeError::Dataset(source) => SessionError::Dataset {
+                case: case.name.clone(),
+                source: Box::new(source),
+            },
+            other => wrong(other.to_string()),
+        })?;
         stages::inputs(case.stage, &chosen, &files, &case.choice)
             .map_err(|e: StageError| wrong(e.to_string()))
     }

@@ -37,16 +37,17 @@ pub struct Pca {
 pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     let (d, n) = samples.shape();
     let m = m.min(n.saturating_sub(1)).min(d);
-    let mean = mean(samples);
     if m == 0 {
-        return Ok(empty(mean, d, n));
+        return Ok(empty(mean(samples), d, n));
     }
-    if n < d
-        && let Some(pca) = by_gram(samples, &mean, m)?
-    {
-        return Ok(pca);
+    if n >= d {
+        return by_qr(samples, mean(samples), m);
     }
-    by_qr(samples, mean, m)
+    let (gram, mean) = gram(samples);
+    match by_gram(samples, &mean, gram.as_ref(), m)? {
+        Some(pca) => Ok(pca),
+        None => by_qr(samples, mean, m),
+    }
 }
 
 /// What a singular value must exceed to count, from the squares of all of them: ||samples||_F^2 is their sum and n |mean|^2.
@@ -66,24 +67,26 @@ fn empty(mean: Vec<f64>, d: usize, n: usize) -> Pca {
 }
 
 fn mean(samples: MatRef<'_, f64>) -> Vec<f64> {
-    let (d, n) = samples.shape();
+    let d = samples.nrows();
     let mut mean = vec![0.0; d];
     mean.par_chunks_mut(BLOCK)
         .enumerate()
-        .for_each(|(b, mean)| {
-            let rows = samples.subrows(b * BLOCK, mean.len());
-            for sample in rows.col_iter() {
-                match sample.try_as_col_major() {
-                    Some(sample) => axpy(1.0, sample.as_slice(), mean),
-                    None => mean
-                        .iter_mut()
-                        .zip(sample.iter())
-                        .for_each(|(sum, x)| *sum += x),
-                }
-            }
-            mean.iter_mut().for_each(|x| *x /= n as f64);
-        });
+        .for_each(|(b, mean)| mean_rows(samples.subrows(b * BLOCK, mean.len()), mean));
     mean
+}
+
+/// Adds the mean of the columns of these rows to zeros.
+fn mean_rows(rows: MatRef<'_, f64>, mean: &mut [f64]) {
+    for sample in rows.col_iter() {
+        match sample.try_as_col_major() {
+            Some(sample) => axpy(1.0, sample.as_slice(), mean),
+            None => mean
+                .iter_mut()
+                .zip(sample.iter())
+                .for_each(|(sum, x)| *sum += x),
+        }
+    }
+    mean.iter_mut().for_each(|x| *x /= rows.ncols() as f64);
 }
 
 /// Writes rows `first..` of the centred samples into `block`, one sample a column.
@@ -107,26 +110,29 @@ fn centred_rows(samples: MatRef<'_, f64>, mean: &[f64], first: usize, block: Mat
     }
 }
 
-/// The lower triangle of Y^T Y for the centred samples Y.
-fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
+/// The lower triangle of Y^T Y for the centred samples Y, and the mean sample, in one passage over the samples.
+fn gram(samples: MatRef<'_, f64>) -> (Mat<f64>, Vec<f64>) {
     let (d, n) = samples.shape();
-    let blocks: Vec<usize> = (0..d).step_by(BLOCK).collect();
-    let parts: Vec<Mat<f64>> = blocks
-        .par_chunks(blocks.len().div_ceil(PARTS))
-        .map(|firsts| {
+    let mut mean = vec![0.0; d];
+    let rows = BLOCK * d.div_ceil(BLOCK).div_ceil(PARTS).max(1);
+    let parts: Vec<Mat<f64>> = mean
+        .par_chunks_mut(rows)
+        .enumerate()
+        .map(|(part, means)| {
             let mut sum = Mat::zeros(n, n);
             let mut buffer = Mat::zeros(BLOCK, n);
-            for &first in firsts {
-                let mut rows = buffer.get_mut(..BLOCK.min(d - first), ..);
-                centred_rows(samples, mean, first, rows.rb_mut());
-                let rows = rows.rb();
+            for (block, mean) in means.chunks_mut(BLOCK).enumerate() {
+                let samples = samples.subrows(part * rows + block * BLOCK, mean.len());
+                mean_rows(samples, mean);
+                let mut centred = buffer.get_mut(..mean.len(), ..);
+                centred_rows(samples, mean, 0, centred.rb_mut());
                 triangular::matmul(
                     sum.as_mut(),
                     triangular::BlockStructure::TriangularLower,
                     Accum::Add,
-                    rows.transpose(),
+                    centred.rb().transpose(),
                     triangular::BlockStructure::Rectangular,
-                    rows,
+                    centred.rb(),
                     triangular::BlockStructure::Rectangular,
                     1.0,
                     Par::Seq,
@@ -136,16 +142,19 @@ fn gram(samples: MatRef<'_, f64>, mean: &[f64]) -> Mat<f64> {
             sum
         })
         .collect();
-    parts
-        .into_iter()
-        .reduce(|sum, part| sum + part)
-        .unwrap_or_else(|| Mat::zeros(n, n))
+    let sum = parts.into_iter().reduce(|sum, part| sum + part);
+    (sum.unwrap_or_else(|| Mat::zeros(n, n)), mean)
 }
 
 /// The Gram route, or None where the kept singular values spread too far for it.
-fn by_gram(samples: MatRef<'_, f64>, mean: &[f64], m: usize) -> Result<Option<Pca>, FactorError> {
+fn by_gram(
+    samples: MatRef<'_, f64>,
+    mean: &[f64],
+    gram: MatRef<'_, f64>,
+    m: usize,
+) -> Result<Option<Pca>, FactorError> {
     let n = samples.ncols();
-    let eigen = symmetric_eigen(gram(samples, mean).as_ref())?;
+    let eigen = symmetric_eigen(gram)?;
     let negligible = negligible(samples, mean, eigen.values.iter().copied());
     let least = (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible);
     if eigen.values[m - 1] <= least {
@@ -244,8 +253,9 @@ mod tests {
         let samples = Mat::from_fn(700, 9, |i, j| ((i + 1) as f64 * (j as f64 + 0.3)).sin());
         let whole = pca(samples.as_ref(), 8).unwrap();
         assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
-        let mean = mean(samples.as_ref());
-        let gram = by_gram(samples.as_ref(), &mean, 4).unwrap().unwrap();
+        let (gram, mean) = gram(samples.as_ref());
+        let gram = by_gram(samples.as_ref(), &mean, gram.as_ref(), 4);
+        let gram = gram.unwrap().unwrap();
         let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
         assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);
         assert!((&gram.coordinates - &qr.coordinates).norm_max() < 1e-12 * samples.norm_l2());

@@ -4,9 +4,12 @@
 //! normals n_f ~ (j - i) x (k - i) and n_g ~ (l - i) x (j - i), which is g's own normal where g runs from j to i and the opposite one where it runs the same
 //! way as f, and t from i to j, the angle is atan2((n_f x n_g) . t, n_f . n_g), from -pi to pi. Flat is 0; convex edges of a surface that faces outward are
 //! positive. Exchanging the triangles, or turning both round, changes nothing.
+//!
+//! Each triangle adds its own part to the angle's derivatives ([`Lean`]), f as (i, j, k) and the other as (j, i, l): moving k by the unit normal lessens the
+//! angle by 1 over its height, whatever l does.
 
 use super::topology::Pair;
-use super::vector::{Point, cross, dot, norm, sub};
+use super::vector::{Point, along, cross, dot, norm, sub};
 
 /// The hinge of a pair of triangles, as vertices 0-based.
 pub fn hinge(pair: &Pair, faces: &[[u32; 3]]) -> [u32; 4] {
@@ -25,6 +28,74 @@ pub fn dihedral_angle([i, j, k, l]: [Point; 4]) -> f64 {
         true => 0.0,
         false => sine.atan2(cosine),
     }
+}
+
+/// A 3x3 matrix, row by row.
+pub type Block = [[f64; 3]; 3];
+
+/// A triangle's part of the derivatives of the dihedral angle at its first side, by its corners; both triangles' parts add up to the whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lean {
+    /// By each corner.
+    pub first: [Point; 3],
+    /// `second[p][q]`: of the derivative by corner p, by corner q. Only the sum of the two triangles' parts is symmetric.
+    pub second: [[Block; 3]; 3],
+}
+
+impl Lean {
+    /// Of the triangle (i, j, k). None where it has no normal.
+    ///
+    /// With e = j - i, p = k - i, N = e x p and s = p . e / |e|^2, the derivative by k is a = -|e| N / |N|^2, that by j is -s a, that by i -(1 - s) a.
+    #[inline]
+    pub fn new([i, j, k]: [Point; 3]) -> Option<Self> {
+        let (e, p) = (sub(j, i), sub(k, i));
+        let normal = cross(e, p);
+        let (ee, nn) = (dot(e, e), dot(normal, normal));
+        let length = ee.sqrt();
+        let a = normal.map(|x| -length / nn * x);
+        let s = dot(p, e) / ee;
+        if !(a.iter().all(|x| x.is_finite()) && s.is_finite()) {
+            return None;
+        }
+        // da = a (e . de) / |e|^2 - |e| / |N|^2 (1 - 2 n n^T) dN, dN = e x dp - p x de.
+        let mirror = |d: Point| {
+            let mirrored = along(d, -2.0 * dot(d, normal) / nn, normal);
+            mirrored.map(|x| -length / nn * x)
+        };
+        let (mut by_e, mut by_p) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for column in 0..3 {
+            let mut axis = [0.0; 3];
+            axis[column] = 1.0;
+            let (de, dp) = (mirror(cross(axis, p)), mirror(cross(e, axis)));
+            for row in 0..3 {
+                by_e[row][column] = de[row] + a[row] * e[column] / ee;
+                by_p[row][column] = dp[row];
+            }
+        }
+        // ds = (p . de + e . dp) / |e|^2 - 2 s (e . de) / |e|^2.
+        let s_by_e = along(p, -2.0 * s, e).map(|x| x / ee);
+        let s_by_p = e.map(|x| x / ee);
+        let of_j = |block: &Block, ds: Point| -> Block {
+            std::array::from_fn(|r| std::array::from_fn(|c| -s * block[r][c] - a[r] * ds[c]))
+        };
+        let of_k = by_corners(by_e, by_p);
+        let of_j = by_corners(of_j(&by_e, s_by_e), of_j(&by_p, s_by_p));
+        let of_i = std::array::from_fn(|q| opposite(&of_j[q], &of_k[q]));
+        Some(Self {
+            first: [a.map(|x| -(1.0 - s) * x), a.map(|x| -s * x), a],
+            second: [of_i, of_j, of_k],
+        })
+    }
+}
+
+/// Derivatives by e = j - i and p = k - i as derivatives by i, j and k.
+fn by_corners(by_e: Block, by_p: Block) -> [Block; 3] {
+    [opposite(&by_e, &by_p), by_e, by_p]
+}
+
+/// -(a + b).
+fn opposite(a: &Block, b: &Block) -> Block {
+    std::array::from_fn(|r| std::array::from_fn(|c| -(a[r][c] + b[r][c])))
 }
 
 #[cfg(test)]
@@ -89,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn no_normal_means_no_angle_and_no_gradient() {
+    fn no_normal_means_no_angle_and_no_derivative() {
         let [i, j, k, l] = crease(1.0);
         for corners in [
             [i, i, k, l],
@@ -99,6 +170,28 @@ mod tests {
         ] {
             assert_eq!(dihedral_angle(corners), 0.0);
         }
+        assert_eq!(Lean::new([i, i, k]), None);
+        assert_eq!(Lean::new([i, j, [5.0, 0.0, 0.0]]), None);
+        assert!(Lean::new([i, j, k]).is_some());
+    }
+
+    /// The first and second derivatives of a hinge's angle by its four corners.
+    fn whole([i, j, k, l]: [Point; 4]) -> ([Point; 4], [[Block; 4]; 4]) {
+        let (mut first, mut second) = ([[0.0; 3]; 4], [[[[0.0; 3]; 3]; 4]; 4]);
+        for (triangle, places) in [([i, j, k], [0, 1, 2]), ([j, i, l], [1, 0, 3])] {
+            let lean = Lean::new(triangle).unwrap();
+            for p in 0..3 {
+                for r in 0..3 {
+                    first[places[p]][r] += lean.first[p][r];
+                    for q in 0..3 {
+                        for c in 0..3 {
+                            second[places[p]][places[q]][r][c] += lean.second[p][q][r][c];
+                        }
+                    }
+                }
+            }
+        }
+        (first, second)
     }
 
     fn corners() -> impl Strategy<Value = [Point; 4]> {
@@ -125,6 +218,38 @@ mod tests {
             prop_assert!(close(dihedral_angle([j, i, l, k])), "the other triangle first");
             prop_assert!(close(-dihedral_angle([j, i, k, l])), "both turned round");
             prop_assert!(close(-dihedral_angle(corners.map(|[x, y, z]| [x, y, -z]))), "mirrored");
+        }
+
+        /// Against central differences, of the angle and of the first derivatives.
+        #[test]
+        fn derivatives(corners in corners()) {
+            prop_assume!(heights(corners) > 0.2);
+            const STEP: f64 = 1e-5;
+            let moved = |corner: usize, axis: usize, by: f64| {
+                let mut moved = corners;
+                moved[corner][axis] += by;
+                moved
+            };
+            let first = |corners: [Point; 4]| whole(corners).0;
+            let (found, second) = whole(corners);
+            for corner in 0..4 {
+                for axis in 0..3 {
+                    let [after, before] = [STEP, -STEP].map(|by| moved(corner, axis, by));
+                    let gap = dihedral_angle(after) - dihedral_angle(before);
+                    let gap = gap - 2.0 * PI * (gap / (2.0 * PI)).round();
+                    prop_assert!((gap / (2.0 * STEP) - found[corner][axis]).abs() < 1e-6);
+                    let (after, before) = (first(after), first(before));
+                    for other in 0..4 {
+                        for r in 0..3 {
+                            let expected = (after[other][r] - before[other][r]) / (2.0 * STEP);
+                            let found = second[other][corner][r][axis];
+                            prop_assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+                            let transposed = second[corner][other][axis][r];
+                            prop_assert!((found - transposed).abs() < 1e-9 * (1.0 + found.abs()));
+                        }
+                    }
+                }
+            }
         }
     }
 }

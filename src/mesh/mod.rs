@@ -5,7 +5,10 @@ pub mod dihedral;
 pub mod distance;
 pub mod measure;
 pub mod orientation;
+mod predicates;
+pub mod self_intersections;
 pub mod topology;
+mod tree;
 mod triangle;
 pub(crate) mod vector;
 

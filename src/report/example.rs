@@ -1,6 +1,6 @@
 //! A made-up record for the tests: what a run looks like, and what a hostile or broken one does.
 
-use crate::exhibits::{Chart, Exhibit, Line, Panel, Picture, Style, Table as Sheet};
+use crate::exhibits::{Chart, Exhibit, Ground, Line, Panel, Picture, Style, Table as Sheet};
 use crate::harness::record::{
     AccuracyRow, AgreementRow, EngineRow, FitFigures, Record, SampleRow, TimingRow, Verdict,
 };
@@ -392,13 +392,20 @@ fn hostile_exhibit(bad: &[f64]) -> Exhibit {
         style,
         points: points.clone(),
     };
-    let chart = |equal, logarithmic, lines| {
+    let ground = |across, low| Ground {
+        corners: [[low; 2], [1.0; 2]],
+        across,
+        cells: format!("0123{HOSTILE}"),
+        kinds: vec![HOSTILE.into(); 4],
+    };
+    let chart = |equal, logarithmic, ground, lines| {
         Panel::Chart(Chart {
             title: HOSTILE.into(),
             x_title: HOSTILE.into(),
             y_title: HOSTILE.into(),
             equal,
             logarithmic,
+            ground,
             lines,
         })
     };
@@ -414,9 +421,17 @@ fn hostile_exhibit(bad: &[f64]) -> Exhibit {
                 heads: vec![HOSTILE.into(); 3],
                 rows: vec![vec![HOSTILE.into(); 2], Vec::new()],
             }),
-            chart(true, false, styles.map(line).to_vec()),
-            chart(false, true, styles.map(line).to_vec()),
-            chart(true, true, Vec::new()),
+            chart(true, false, None, styles.map(line).to_vec()),
+            chart(false, true, None, styles.map(line).to_vec()),
+            chart(true, true, None, Vec::new()),
+            chart(true, false, Some(ground(1, 0.0)), styles.map(line).to_vec()),
+            chart(false, true, Some(ground(0, 0.0)), styles.map(line).to_vec()),
+            chart(
+                true,
+                false,
+                Some(ground(1, f64::NAN)),
+                styles.map(line).to_vec(),
+            ),
             Panel::Picture(Picture {
                 title: HOSTILE.into(),
                 png: HOSTILE.into(),

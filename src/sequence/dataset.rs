@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::Sequence;
 use super::format::stream::FrameStream;
 use super::format::{FormatError, frame_files, read, stream};
 use super::synthetic::{SyntheticError, embedded, stream_embedded};
+use super::{Sequence, SequenceError};
 
 /// Why there is no such sequence.
 #[derive(Debug, Error)]
@@ -27,7 +27,13 @@ pub enum DatasetError {
     /// See [`FormatError`].
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A reference pose of another mesh than the poses. See [`SequenceError`].
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
 }
+
+/// The folder of real data with a reference pose `NAME.obj` for poses `NAME`.
+const REST: &str = "rest-poses";
 
 /// Where real data may lie.
 #[derive(Clone, Debug, Default)]
@@ -51,6 +57,25 @@ impl DataFolders {
     /// The OBJ files of a dataset of real data.
     pub fn files(&self, name: &str) -> Result<Vec<PathBuf>, DatasetError> {
         Ok(frame_files(&self.folder(name)?)?)
+    }
+
+    /// The first poses of a dataset as examples, `count` of them or all: the reference pose of real ones, where there is one, comes first.
+    pub fn examples(&self, name: &str, count: usize) -> Result<Sequence, DatasetError> {
+        let poses = self.sequence(name)?;
+        let file = format!("{name}.obj");
+        let rest = match name.starts_with('@') {
+            true => Vec::new(),
+            false => self.files(REST).unwrap_or_default(),
+        };
+        let mut positions = match rest.iter().find(|path| path.ends_with(&file)) {
+            Some(path) => read(path)?.positions().to_vec(),
+            None => Vec::new(),
+        };
+        positions.extend(poses.positions());
+        positions.truncate(count * poses.dimension());
+        let frames = positions.len() / poses.dimension();
+        let mesh = poses.connectivity().clone();
+        Ok(Sequence::new(mesh, frames, positions)?)
     }
 
     fn folder(&self, name: &str) -> Result<PathBuf, DatasetError> {

@@ -8,6 +8,7 @@
 //! | [`vertex`] | 3V | positions |
 //! | [`gradient`] | 9F + 3C | rotation vector and stretch of every triangle's deformation gradient, centres of components |
 //! | [`lric`] | 3E + 6C | stretches of triangles, dihedral angles of edges, rotations and centres of components |
+//! | [`lengths`] | 2E + 6C | lengths and dihedral angles of edges, rotations and centres of components |
 //! | [`patch`] | 9F + 3A + 6C | gradients against the mean rotations of patches, those against adjacent ones, rotations and centres of components |
 
 pub mod branches;
@@ -16,6 +17,7 @@ pub mod frames;
 pub mod gradient;
 pub mod halfway;
 pub mod hinges;
+pub mod lengths;
 pub mod lric;
 pub mod partition;
 pub mod patch;
@@ -25,6 +27,7 @@ pub mod poisson;
 mod pool;
 pub mod posed;
 pub mod reference;
+pub mod shell;
 pub mod surface;
 #[cfg(test)]
 mod tests;
@@ -51,13 +54,21 @@ pub enum SpaceKind {
     Gradient,
     /// Linear rotation-invariant coordinates (Lipman et al. 2005).
     Lric,
+    /// Edge lengths and dihedral angles (Winkler et al. 2010, Froehlich & Botsch 2011).
+    Lengths,
     /// Patch-based rotation-invariant coordinates (Baran et al. 2009).
     Patch,
 }
 
 impl SpaceKind {
     /// Every space, in the order of the paper.
-    pub const ALL: [Self; 4] = [Self::Vertex, Self::Gradient, Self::Lric, Self::Patch];
+    pub const ALL: [Self; 5] = [
+        Self::Vertex,
+        Self::Gradient,
+        Self::Lric,
+        Self::Lengths,
+        Self::Patch,
+    ];
 
     /// Its name on the command line and in stages.
     pub fn name(self) -> &'static str {
@@ -65,6 +76,7 @@ impl SpaceKind {
             Self::Vertex => "vertex",
             Self::Gradient => "gradient",
             Self::Lric => "lric",
+            Self::Lengths => "lengths",
             Self::Patch => "patch",
         }
     }
@@ -78,7 +90,7 @@ impl fmt::Display for SpaceKind {
 
 /// A name that no space has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no shape space `{0}`; there are vertex, gradient, lric and patch")]
+#[error("there is no shape space `{0}`; there are vertex, gradient, lric, lengths and patch")]
 pub struct UnknownSpace(String);
 
 impl FromStr for SpaceKind {
@@ -160,6 +172,7 @@ pub fn prepare(
         SpaceKind::Vertex => Box::new(vertex::VertexSpace::new(connectivity.vertex_count())),
         SpaceKind::Gradient => Box::new(gradient::GradientSpace::new(connectivity, reference)?),
         SpaceKind::Lric => Box::new(lric::LricSpace::new(connectivity, reference)?),
+        SpaceKind::Lengths => Box::new(lengths::LengthsSpace::new(connectivity, reference)?),
         SpaceKind::Patch => Box::new(patch::PatchSpace::new(connectivity, reference, patches)?),
     })
 }
@@ -205,7 +218,7 @@ pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeEr
 pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let mut z = encode_each(space, frames)?;
     if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {
-        others.iter_mut().for_each(|z| {
+        others.par_iter_mut().for_each(|z| {
             space.unwrap(first, z);
             space.unwrap_over_surface(z);
         });

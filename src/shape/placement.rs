@@ -3,7 +3,7 @@
 
 use super::posed::{posed, rest_axes};
 use super::reference::{Reference, Triangle};
-use crate::linalg::rotation::{Matrix, exp, log, nearest_branch, times_transposed};
+use crate::linalg::rotation::{Matrix, apply, exp, log, nearest_branch, times_transposed};
 use crate::mesh::vector::point;
 
 /// Numbers of a component.
@@ -41,6 +41,22 @@ pub fn place(reference: &Reference, z: &[f64], positions: &mut [f64]) {
     let parts = z.as_chunks::<NUMBERS>().0.iter();
     let centres: Vec<f64> = parts.flat_map(|&[.., x, y, z]| [x, y, z]).collect();
     reference.place(&centres, positions);
+}
+
+/// Turns every component of a frame so that its lowest triangle faces as its numbers say, and moves it to its centre.
+pub fn turn_and_place(reference: &Reference, z: &[f64], positions: &mut [f64]) {
+    let wanted = rotations(z);
+    let turns: Vec<_> = rotations_of(reference, positions)
+        .zip(&wanted)
+        .map(|(found, wanted)| found.map(|found| times_transposed(wanted, &found)))
+        .collect();
+    let points = positions.as_chunks_mut::<3>().0.iter_mut();
+    for (p, &label) in points.zip(&reference.labels) {
+        if let Some(turn) = &turns[label as usize] {
+            *p = apply(turn, *p);
+        }
+    }
+    place(reference, z, positions);
 }
 
 /// Chooses the branches of the rotation vectors nearest to those of `previous`.

@@ -62,6 +62,24 @@ fn plane_map(rest: &Triangle, length: f64, foot: f64, height: f64) -> [[f64; 2];
     ]
 }
 
+/// The stretch of a triangle with these sides ab, bc and ca, none below 0. Sides that make no triangle make the flat one whose ab and ca are as given.
+pub fn stretch_of_sides(rest: &Triangle, [ab, bc, ca]: [f64; 3]) -> Stretch {
+    if ab == 0.0 {
+        return plane_polar(plane_map(rest, 0.0, ca, 0.0)).stretch;
+    }
+    let foot = 0.5 * (ab + (ca - bc) / ab * (ca + bc));
+    let height = 2.0 * area_of_sides([ab, bc, ca]) / ab;
+    plane_polar(plane_map(rest, ab, foot.clamp(-ca, ca), height)).stretch
+}
+
+/// The area of a triangle with these sides, 0 where they make none: Heron's formula without cancellation (Kahan 2014).
+pub fn area_of_sides(mut sides: [f64; 3]) -> f64 {
+    sides.sort_unstable_by(|a, b| b.total_cmp(a));
+    let [a, b, c] = sides;
+    let product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
+    0.25 * product.max(0.0).sqrt()
+}
+
 fn across(x: Point, axis: Point) -> Point {
     let once = along(x, -dot(x, axis), axis);
     // Once more, because a thin triangle leaves little.

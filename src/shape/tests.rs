@@ -12,7 +12,12 @@ use crate::mesh::measure::bounds;
 use crate::sequence::synthetic::embedded;
 use crate::sequence::synthetic::roll::{SMALL, roll_strip};
 
-const KINDS: [SpaceKind; 3] = [SpaceKind::Gradient, SpaceKind::Lric, SpaceKind::Patch];
+const KINDS: [SpaceKind; 4] = [
+    SpaceKind::Gradient,
+    SpaceKind::Lric,
+    SpaceKind::Lengths,
+    SpaceKind::Patch,
+];
 
 /// With patches by how these frames move.
 fn space(
@@ -199,7 +204,7 @@ fn a_roll_rolls_by_half() {
     for degrees in [90.0f64, 170.0, 350.0, 700.0] {
         let angle = degrees.to_radians();
         let frames = [flat_strip.clone(), flat(&roll_strip(angle, &SMALL))].concat();
-        for kind in [SpaceKind::Lric, SpaceKind::Patch] {
+        for kind in [SpaceKind::Lric, SpaceKind::Lengths, SpaceKind::Patch] {
             let space = space(kind, roll.connectivity(), &flat_strip, &frames);
             let z = encode_all(&*space, &frames).unwrap();
             let half: Vec<f64> = (0..z.nrows())

@@ -254,6 +254,22 @@ pub fn frames_of_coordinates(
     }))
 }
 
+/// A motion (n x 3V positions) on another mesh: its signals, k control points and l sites, fitted over examples of its own mesh, and then over those of
+/// the other. Both are 3V positions each, frame by frame the same poses, the reference pose first.
+pub fn transfer_motion(
+    motion: &[f64],
+    [from, to]: [&dyn Space; 2],
+    [source, target]: [&[f64]; 2],
+    (k, l): (usize, usize),
+    knots: KnotRule,
+) -> Result<Representation, TransferError> {
+    let (q, r) = (encode_examples(from, source)?, encode_examples(to, target)?);
+    let basis = ExampleBasis::new(q.as_ref())?;
+    let z = encode_motion(from, &source[..from.frame_len()], &basis, motion)?;
+    let fit = basis.fit(z.as_ref(), k, l, knots, &[])?;
+    replace_shape(fit.representation, r.as_ref())
+}
+
 /// Rounds in which the branches of the angles follow what the examples show.
 const ROUNDS: usize = 3;
 

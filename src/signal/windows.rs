@@ -244,8 +244,8 @@ mod tests {
         let frames = 3;
         assert_eq!(Plan::new(3, 10, 2), Err(PlanError::TooFewFrames { frames }));
         let read = |windows: &[[usize; 2]], overlap| {
-            let ranges = windows.iter().map(|&[start, end]| start..end);
-            Plan::from_windows(ranges.collect(), overlap).map_err(|e| match e {
+            let windows = windows.iter().map(|&[start, end]| Range { start, end });
+            Plan::from_windows(windows.collect(), overlap).map_err(|e| match e {
                 PlanError::Astray { window, .. } => window,
                 _ => 0,
             })

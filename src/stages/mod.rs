@@ -1,5 +1,7 @@
 //! The algorithms as named stages: plain arrays in, plain arrays out. `oracles/PROTOCOL.md` gives every stage's arrays.
 
+pub mod made;
+pub mod mesh;
 pub mod poisson;
 pub mod sequence;
 pub mod shape;
@@ -53,6 +55,7 @@ impl StageError {
 pub fn all() -> impl Iterator<Item = &'static Stage> {
     let systems = [
         sequence::STAGES,
+        mesh::STAGES,
         shape::STAGES,
         poisson::STAGES,
         signal::STAGES,
@@ -135,6 +138,7 @@ pub fn inputs(
                 ("F", Array::triangles(faces)),
             ]))
         }
+        "mesh.quality" => Ok(mesh::inputs(sequence)),
         "signal.transfer" => signal::transfer_inputs(sequence, choice),
         _ if stage.starts_with("shape.poisson_") => poisson::inputs(sequence),
         _ if stage.starts_with("shape.") => shape::inputs(stage, sequence, choice),

@@ -32,6 +32,16 @@ pub static STAGES: &[Stage] = &[
         prepare: |inputs| decode(SpaceKind::Lric, inputs),
     },
     Stage {
+        name: "shape.lengths_encode",
+        about: "lengths and dihedral angles of edges (section 5; Winkler et al. 2010, Froehlich & Botsch 2011)",
+        prepare: |inputs| encode(SpaceKind::Lengths, inputs),
+    },
+    Stage {
+        name: "shape.lengths_decode",
+        about: "frames from lengths and dihedral angles by nonlinear least squares (section 5)",
+        prepare: |inputs| decode(SpaceKind::Lengths, inputs),
+    },
+    Stage {
         name: "shape.patch_encode",
         about: "gradients against the mean rotations of patches, those against adjacent ones (section 5; Baran et al. 2009)",
         prepare: |inputs| encode(SpaceKind::Patch, inputs),
@@ -162,8 +172,10 @@ pub fn inputs(stage: &str, sequence: &Sequence, choice: &Choice) -> Result<Bundl
     let space = prepare(kind, mesh, sequence.frame(0), &labels).map_err(StageError::from_error)?;
     let z = encode_all(&*space, sequence.positions());
     let z = z.map_err(StageError::from_error)?;
-    let between = z.subcols(0, n - 1) + z.subcols(1, n - 1);
-    let z = faer::concat![[z, 0.5 * between]];
+    let z = match choice.means {
+        true => faer::concat![[&z, 0.5 * (z.subcols(0, n - 1) + z.subcols(1, n - 1))]],
+        false => z,
+    };
     inputs.put("z", Array::columns(z.as_ref()));
     inputs.put("truth", frames);
     Ok(inputs)

@@ -17,9 +17,17 @@ use crate::signal::mds::{Dissimilarities, scale};
 use crate::signal::parameters::{centripetal, distinct};
 use crate::signal::pins::{Pin, principal_start, validate_pins};
 use crate::signal::psi::{Representation, TimeSignal};
+use crate::signal::refine::rows::Rows;
+use crate::signal::refine::{RefineOptions, Signals, minimise};
 use crate::signal::rho::Rho;
 use crate::signal::sites::site_order;
 use crate::signal::transfer::{ExampleBasis, frames_of_coordinates};
+
+/// The most steps of a refinement that is judged, and the share below which steps gain nothing.
+const STEPS: usize = 2000;
+const EXACT: f64 = 1e-15;
+/// What a refinement without a start says.
+const NOTHING: &str = "there is nothing to refine: fewer than three sites, or functions that are dependent along the curve";
 
 /// In the order of the paper.
 pub static STAGES: &[Stage] = &[
@@ -87,6 +95,11 @@ pub static STAGES: &[Stage] = &[
         name: "signal.transfer",
         about: "frames of one mesh as frames of another, by examples (section 4.3)",
         prepare: transfer,
+    },
+    Stage {
+        name: "signal.refine",
+        about: "joint refinement: (2) over f, g and h at given sites (beyond section 3)",
+        prepare: refine,
     },
     Stage {
         name: "signal",
@@ -398,6 +411,49 @@ pub fn transfer_inputs(sequence: &Sequence, choice: &Choice) -> Result<Bundle, S
     ]))
 }
 
+fn refine(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
+    let rows = Rows {
+        targets: inputs.columns("Y")?.transpose().to_owned(),
+        parameters: inputs.vector("t")?.to_vec(),
+        weights: inputs.vector("w")?.to_vec(),
+    };
+    let spline = Spline {
+        control: inputs.points("control")?,
+        knots: inputs.vector("u")?.to_vec(),
+    };
+    let sites = inputs.points("sites")?;
+    let m = inputs.columns("H")?.ncols();
+    same_count("t", rows.parameters.len(), rows.targets.nrows())?;
+    same_count("w", rows.weights.len(), rows.targets.nrows())?;
+    let options = RefineOptions {
+        iterations: inputs.integer("iterations")?,
+        tolerance: EXACT,
+        hold_sites: true,
+        ..RefineOptions::default()
+    };
+    call(
+        move || {
+            let found = minimise(&rows, &spline, &sites, m, &options);
+            found.ok_or_else(|| StageError::Failed(NOTHING.into()))
+        },
+        |found| {
+            let mut outputs = signal_arrays(&found.signals);
+            outputs.put("error", Array::vector(&[found.error]));
+            outputs
+        },
+    )
+}
+
+fn signal_arrays(s: &Signals) -> Bundle {
+    Bundle::from([
+        ("h0", Array::vector(&s.offset)),
+        ("H", Array::columns(s.basis.as_ref())),
+        ("sites", Array::points(&s.pose.sites)),
+        ("g", Array::columns(s.pose.coefficients.as_ref())),
+        ("control", Array::points(&s.spline.control)),
+    ])
+}
+
 fn pipeline(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let frames: Mat<f64> = inputs.matrix("Z")?;
     let [k, l, m] = ["k", "l", "m"].map(|name| inputs.integer(name));
@@ -442,7 +498,11 @@ pub fn inputs(stage: &str, frames: MatRef<'_, f64>, choice: &Choice) -> Result<B
             ("space", Array::Text(choice.space.to_string())),
         ]));
     }
-    Chain::new(frames, choice)?.inputs(stage)
+    let chain = Chain::new(frames, choice)?;
+    match stage {
+        "signal.refine" => chain.refinement(frames),
+        _ => chain.inputs(stage),
+    }
 }
 
 /// psi(i) for every frame i of the fit: n times d numbers.
@@ -461,6 +521,8 @@ pub struct Choice {
     pub knots: KnotRule,
     pub pins: usize,
     pub space: SpaceKind,
+    /// Whether a decode stage is given means of neighbouring frames too, which poses that no motion joins have none of.
+    pub means: bool,
 }
 
 /// The reconstruction, from which the inputs of its stages are taken.
@@ -543,6 +605,32 @@ impl<'a> Chain<'a> {
                 )));
             }
         })
+    }
+
+    /// A fit in the coordinates of all principal components of the frames, refined already with its sites held, but not to the end: the error has
+    /// several minima, and the one that two engines find must be the same.
+    fn refinement(&self, frames: MatRef<'_, f64>) -> Result<Bundle, StageError> {
+        let whole = shape_signal(frames, frames.ncols().saturating_sub(1))
+            .map_err(StageError::from_error)?;
+        let psi = &self.fit.representation;
+        let between = RefineOptions::default().between;
+        let rows = Rows::of_frames(whole.coordinates.as_ref(), &psi.time.parameters, between);
+        let options = RefineOptions {
+            hold_sites: true,
+            ..RefineOptions::default()
+        };
+        let (spline, sites) = (&psi.time.spline, &psi.pose.sites);
+        let near = minimise(&rows, spline, sites, self.choice.m, &options);
+        let near = near
+            .ok_or_else(|| StageError::Failed(NOTHING.into()))?
+            .signals;
+        let mut inputs = signal_arrays(&near);
+        inputs.put("u", Array::vector(&near.spline.knots));
+        inputs.put("Y", Array::columns(rows.targets.transpose()));
+        inputs.put("t", Array::vector(&rows.parameters));
+        inputs.put("w", Array::vector(&rows.weights));
+        inputs.put("iterations", Array::integer(STEPS));
+        Ok(inputs)
     }
 
     /// The first frames pinned a little away from where scaling would put them.

@@ -31,6 +31,7 @@ fn verbs(scratch: &Scratch, npz: &str, json: &str) -> Vec<Vec<String>> {
     let verb = |all: &[&str]| all.iter().map(|s| s.to_string()).collect();
     vec![
         verb(&["info", &good, "--json", json]),
+        verb(&["info", &good, "--json", &fine_json, "--quality", json]),
         verb(&["convert", &good, npz]),
         verb(&["signal", "sample", &rep, "-o", npz]),
         fit(npz, &fine_json),
@@ -131,6 +132,12 @@ fn the_full_device() {
     refused(
         scratch.path(),
         &["info", &good, "--json", "/dev/full"],
+        &words,
+    );
+    let json = scratch.arg("fine.json");
+    refused(
+        scratch.path(),
+        &["info", &good, "--json", &json, "--quality", "/dev/full"],
         &words,
     );
     let fit = [

@@ -41,7 +41,7 @@ pub struct DesignVerb {
     /// Dimension of the shape subspace; all if not given
     #[arg(long, allow_negative_numbers = true, value_parser = whole("0 or more"))]
     m: Option<usize>,
-    /// Shape space: vertex, gradient, lric or patch; its reference is the first frame of SEQ
+    /// Shape space: vertex, gradient, lric, lengths or patch; its reference is the first frame of SEQ
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     #[command(flatten)]

@@ -23,7 +23,7 @@ pub struct LeaveOutVerb {
     sequence: String,
     #[command(flatten)]
     frames: FrameChoice,
-    /// Shape space: vertex, gradient, lric or patch; its reference is the first frame
+    /// Shape space: vertex, gradient, lric, lengths or patch; its reference is the first frame
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
     space: String,
     /// How knots average parameters: symmetric or literal

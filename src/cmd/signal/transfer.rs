@@ -47,7 +47,7 @@ pub struct TransferVerb {
         allow_hyphen_values = true
     )]
     example_frames: String,
-    /// Shape space of both meshes: vertex, gradient, lric or patch; that of the representation if not given, vertex for a sequence
+    /// Shape space of both meshes: vertex, gradient, lric, lengths or patch; that of the representation if not given, vertex for a sequence
     #[arg(long, value_name = "SPACE")]
     space: Option<String>,
     /// Control points of the time signal of a sequence, 4 to n + 2; n + 2 if not given

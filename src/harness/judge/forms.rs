@@ -19,47 +19,61 @@ struct Layout {
     components: usize,
 }
 
-struct PairPlace {
-    triangles: [usize; 2],
-    edge: [u32; 2],
+pub(super) struct PairPlace {
+    pub triangles: [usize; 2],
+    pub edge: [u32; 2],
     same_way: bool,
-    place: usize,
+    pub place: usize,
+}
+
+impl PairPlace {
+    /// Of two half-edges, as triangle and corner.
+    pub fn new(faces: &[[u32; 3]], first: Half, other: Half, place: usize) -> Self {
+        let side = |(f, corner): Half| [faces[f][corner], faces[f][(corner + 1) % 3]];
+        Self {
+            triangles: [first.0, other.0],
+            edge: side(first),
+            same_way: side(first) == side(other),
+            place,
+        }
+    }
+}
+
+/// A triangle, and the corner from which one of its sides starts.
+type Half = (usize, usize);
+
+/// The edges, with their half-edges in the order of their triangles; a side from a vertex to itself is none.
+pub(super) fn fans(faces: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<Half>> {
+    let mut fans: BTreeMap<[u32; 2], Vec<Half>> = BTreeMap::new();
+    for (f, face) in faces.iter().enumerate() {
+        for corner in 0..3 {
+            let [a, b] = [face[corner], face[(corner + 1) % 3]];
+            if a != b {
+                fans.entry([a.min(b), a.max(b)])
+                    .or_default()
+                    .push((f, corner));
+            }
+        }
+    }
+    fans
 }
 
 impl Layout {
     fn new(faces: &[[u32; 3]]) -> Self {
-        // Half-edges of each edge, in the order of their triangles; a side from a vertex to itself is none.
-        let mut fans: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
-        for (f, face) in faces.iter().enumerate() {
-            for corner in 0..3 {
-                let [a, b] = [face[corner], face[(corner + 1) % 3]];
-                if a != b {
-                    fans.entry([a.min(b), a.max(b)])
-                        .or_default()
-                        .push((f, corner));
-                }
-            }
-        }
         let mut layout = Self {
             halves: vec![[usize::MAX; 3]; faces.len()],
             pairs: Vec::new(),
             components: 0,
         };
-        for fan in fans.values() {
+        for fan in fans(faces).values() {
             let start = layout.components;
             for (i, &(f, corner)) in fan.iter().enumerate() {
                 layout.halves[f][corner] = start + i;
             }
-            let side =
-                |&(f, corner): &(usize, usize)| [faces[f][corner], faces[f][(corner + 1) % 3]];
-            for (i, other) in fan[1..].iter().enumerate() {
-                layout.pairs.push(PairPlace {
-                    triangles: [fan[0].0, other.0],
-                    edge: side(&fan[0]),
-                    same_way: side(&fan[0]) == side(other),
-                    place: start + fan.len() + i,
-                });
-            }
+            let others = fan[1..].iter().zip(start + fan.len()..);
+            layout
+                .pairs
+                .extend(others.map(|(other, place)| PairPlace::new(faces, fan[0], *other, place)));
             layout.components += (2 * fan.len() - 1).max(3);
         }
         layout
@@ -67,14 +81,14 @@ impl Layout {
 }
 
 /// The edges of a reference triangle in its plane, first axis along e1.
-fn in_plane(e: [Vector3<f64>; 2]) -> Matrix2<f64> {
+pub(super) fn in_plane(e: [Vector3<f64>; 2]) -> Matrix2<f64> {
     let first = e[0].normalize();
     let second = e[0].cross(&e[1]).cross(&e[0]).normalize();
     Matrix2::new(e[0].dot(&first), e[1].dot(&first), 0.0, e[1].dot(&second))
 }
 
 /// The reference triangle's axes in space, 3 x 2.
-fn axes(e: [Vector3<f64>; 2]) -> Matrix3x2<f64> {
+pub(super) fn axes(e: [Vector3<f64>; 2]) -> Matrix3x2<f64> {
     let second = e[0].cross(&e[1]).cross(&e[0]).normalize();
     Matrix3x2::from_columns(&[e[0].normalize(), second])
 }
@@ -96,7 +110,7 @@ fn length_gap(u: Matrix2<f64>, rest: Matrix2<f64>, now: [Vector3<f64>; 2]) -> f6
     gaps.into_iter().map(f64::abs).fold(0.0, f64::max)
 }
 
-fn dihedral(frame: Vertices, faces: &[[u32; 3]], pair: &PairPlace) -> f64 {
+pub(super) fn dihedral(frame: Vertices, faces: &[[u32; 3]], pair: &PairPlace) -> f64 {
     let normal = |f: usize| {
         let [a, b] = edges(frame, &faces[f]);
         a.cross(&b).normalize()
@@ -110,7 +124,7 @@ fn dihedral(frame: Vertices, faces: &[[u32; 3]], pair: &PairPlace) -> f64 {
 }
 
 /// The distance of two angles modulo 2 pi.
-fn turn_gap(a: f64, b: f64) -> f64 {
+pub(super) fn turn_gap(a: f64, b: f64) -> f64 {
     let gap = (a - b).abs() % TAU;
     gap.min(TAU - gap)
 }

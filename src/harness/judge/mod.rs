@@ -4,12 +4,15 @@
 
 mod chain;
 mod distance;
+mod edge_lengths;
 mod encoding;
 mod forms;
 mod halfway;
 mod patched;
 mod pipeline;
 mod pose;
+mod quality;
+mod refinement;
 mod scaling;
 mod shape;
 mod sparse;
@@ -36,8 +39,11 @@ fn judge(stage: &str) -> Option<Judge> {
     let (own, against): (Own, Against) = match stage {
         "sequence.read" => (distance::read_own, distance::read_against),
         "sequence.distance" => (distance::own, distance::against),
+        "mesh.quality" => (quality::own, quality::against),
         "shape.gradient_encode" => (encoding::gradient_own, encoding::gradient_against),
         "shape.lric_encode" => (forms::own, forms::against),
+        "shape.lengths_encode" => (edge_lengths::own, edge_lengths::against),
+        "shape.lengths_decode" => (edge_lengths::descended_own, encoding::decoded_against),
         "shape.patch_encode" => (patched::own, patched::against),
         "shape.gradient_decode" | "shape.lric_decode" | "shape.patch_decode" => {
             (encoding::decoded_own, encoding::decoded_against)
@@ -57,6 +63,7 @@ fn judge(stage: &str) -> Option<Judge> {
         "signal.psi" => (chain::psi_own, chain::psi_against),
         "signal.insert_knots" => (time::more_knots_own, time::more_knots_against),
         "signal.transfer" => (transfer::own, transfer::against),
+        "signal.refine" => (refinement::own, refinement::against),
         "signal" => (pipeline::own, pipeline::against),
         _ => return None,
     };

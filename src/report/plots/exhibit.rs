@@ -8,9 +8,15 @@ use super::{
     BLUE, GREEN, GREY, INK, PURPLE, Picture, PlotError, VERMILION, drawable, drawable_positive,
     note_left_out,
 };
-use crate::exhibits::{Chart, Line, Style};
+use crate::exhibits::{Chart, Ground, Line, Style};
 
 const COLOURS: [RGBColor; 6] = [VERMILION, BLUE, GREEN, PURPLE, GREY, INK];
+/// Of the kinds of a ground's cells: two of amber and one of green, pale enough for lines upon them.
+const GROUNDS: [RGBColor; 3] = [
+    RGBColor(255, 234, 184),
+    RGBColor(245, 190, 90),
+    RGBColor(196, 230, 214),
+];
 const SIZE: (i32, i32) = (520, 380);
 /// What the sides, and what legend and axis, take from the picture.
 const TAKEN: (i32, i32) = (94, 124);
@@ -52,10 +58,16 @@ fn draw(chart: &Chart) -> Result<String, PlotError> {
     if along(0).next().is_none() {
         return Err(PlotError::NothingToDraw("no points of this chart"));
     }
-    let x = Axis::padded(along(0), 0.03, 8);
-    let y = match chart.logarithmic {
-        true => Axis::logarithmic(along(1), 7, power_label),
-        false => Axis::padded(along(1), 0.05, 7),
+    let ground = chart.ground.as_ref().filter(|g| is_sound(g));
+    let ends = |a: usize| ground.map(|g| (g.corners[0][a], g.corners[1][a]));
+    let x = match ends(0) {
+        Some(ends) => Axis::between(ends, 8),
+        None => Axis::padded(along(0), 0.03, 8),
+    };
+    let y = match ends(1) {
+        _ if chart.logarithmic => Axis::logarithmic(along(1), 7, power_label),
+        Some(ends) => Axis::between(ends, 7),
+        None => Axis::padded(along(1), 0.05, 7),
     };
     let (x, y, height) = match chart.equal && !chart.logarithmic {
         true => {
@@ -73,9 +85,14 @@ fn draw(chart: &Chart) -> Result<String, PlotError> {
     let named: Vec<_> = named
         .map(|(i, line)| (i, line.style, printable(&line.name)))
         .collect();
+    let kinds: Vec<_> = ground.map_or(&[][..], |g| &g.kinds).iter().collect();
+    let kinds: Vec<_> = kinds.into_iter().map(|kind| printable(kind)).collect();
+    let of_ground = kinds.iter().zip(GROUNDS);
+    let of_ground = of_ground.map(|(kind, colour)| (Mark::Square, colour, kind.as_str()));
     let legend: Vec<_> = named
         .iter()
         .map(|(i, style, name)| (mark(*style), colour(*i), name.as_str()))
+        .chain(of_ground)
         .collect();
     let [x_title, y_title] = [&chart.x_title, &chart.y_title].map(|t| printable(t));
     let frame = Frame {
@@ -89,12 +106,69 @@ fn draw(chart: &Chart) -> Result<String, PlotError> {
         legend: &legend,
     };
     draw_chart(&frame, |canvas| {
-        let mut lines = chart.lines.iter().enumerate();
-        lines.try_for_each(|(i, line)| {
-            let places = usable(chart, line).map(|p| canvas.at(p)).collect();
-            draw_line(canvas, line.style, places, colour(i))
+        if let Some(ground) = ground {
+            draw_ground(canvas, ground)?;
+        }
+        // Marks stand on lines.
+        let (lines, marks): (Vec<_>, Vec<_>) = chart
+            .lines
+            .iter()
+            .enumerate()
+            .partition(|(_, line)| matches!(line.style, Style::Line | Style::Dashes));
+        lines.into_iter().chain(marks).try_for_each(|(i, line)| {
+            let points: Vec<_> = usable(chart, line).collect();
+            let inside = |p: &[f64; 2]| ground.is_none_or(|g| is_inside(g, *p));
+            let mut parts = points.chunk_by(|a, b| inside(a) == inside(b));
+            parts.try_for_each(|part| match inside(&part[0]) {
+                true => {
+                    let places = part.iter().map(|&p| canvas.at(p)).collect();
+                    draw_line(canvas, line.style, places, colour(i))
+                }
+                false => Ok(()),
+            })
         })
     })
+}
+
+/// Whether a ground has an extent and whole rows.
+fn is_sound(ground: &Ground) -> bool {
+    let [low, high] = ground.corners;
+    let cells = ground.cells.len();
+    (0..2).all(|a| drawable(low[a]) && drawable(high[a]) && low[a] < high[a])
+        && cells > 0
+        && cells.checked_rem(ground.across) == Some(0)
+}
+
+fn is_inside(ground: &Ground, p: [f64; 2]) -> bool {
+    let [low, high] = ground.corners;
+    (0..2).all(|a| (low[a]..=high[a]).contains(&p[a]))
+}
+
+/// Cells of a kind that lie side by side as one bar.
+fn draw_ground(canvas: &Canvas, ground: &Ground) -> Result<(), PlotError> {
+    let [low, high] = ground.corners;
+    let rows = ground.cells.len() / ground.across;
+    let corner = |x: usize, y: usize| {
+        let along =
+            |a: usize, i: usize, of: usize| low[a] + (high[a] - low[a]) * i as f64 / of as f64;
+        canvas.at([along(0, x, ground.across), along(1, y, rows)])
+    };
+    for (y, row) in ground
+        .cells
+        .as_bytes()
+        .chunks_exact(ground.across)
+        .enumerate()
+    {
+        let mut x = 0;
+        for part in row.chunk_by(|a, b| a == b) {
+            let kind = usize::from(part[0].wrapping_sub(b'0'));
+            if let Some(&colour) = kind.checked_sub(1).and_then(|kind| GROUNDS.get(kind)) {
+                canvas.bar(corner(x, y), corner(x + part.len(), y + 1), colour)?;
+            }
+            x += part.len();
+        }
+    }
+    Ok(())
 }
 
 /// Text without what an SVG may not hold; plotters escapes the rest.

@@ -5,6 +5,7 @@ use faer::Mat;
 use super::RefineOptions;
 use super::normal::Normal;
 use super::projection::{Problem, Projection, Unknowns};
+use crate::signal::Point;
 
 /// The first damping, and the damping beyond which no step helps.
 const DAMPING: [f64; 2] = [1e-3, 1e10];
@@ -85,16 +86,19 @@ fn lower(
     None
 }
 
+/// The unknowns after a step in the order of [`Normal`]; sites that it leaves out stay.
 fn moved(unknowns: &Unknowns, step: &Mat<f64>) -> Unknowns {
-    let (k, l) = (unknowns.control.len(), unknowns.sites.len());
-    let control = unknowns.control.iter().enumerate();
-    let sites = unknowns.sites.iter().enumerate();
-    Unknowns {
-        control: control
-            .map(|(j, c)| [c[0] + step[(j, 0)], c[1] + step[(k + j, 0)]])
-            .collect(),
-        sites: sites
-            .map(|(j, s)| [s[0] + step[(2 * k + j, 0)], s[1] + step[(2 * k + l + j, 0)]])
-            .collect(),
+    let mut next = unknowns.clone();
+    let (control, sites) = step.col_as_slice(0).split_at(2 * next.control.len());
+    shift(&mut next.control, control);
+    shift(&mut next.sites, sites);
+    next
+}
+
+/// Moves points by x of all of them, then y of all of them; not at all by nothing.
+fn shift(points: &mut [Point], by: &[f64]) {
+    let (x, y) = by.split_at(by.len() / 2);
+    for (point, (x, y)) in points.iter_mut().zip(x.iter().zip(y)) {
+        *point = [point[0] + x, point[1] + y];
     }
 }

@@ -46,6 +46,9 @@ pub struct RefineOptions {
     pub iterations: usize,
     /// Steps that lower the error by less than this share end the descent.
     pub tolerance: f64,
+    /// Whether the sites stay where they are. The error over f, g and h has a minimum then; with sites that move it often has none: they run
+    /// together, and coefficients grow without bound.
+    pub hold_sites: bool,
 }
 
 impl Default for RefineOptions {
@@ -54,6 +57,7 @@ impl Default for RefineOptions {
             between: 0.5,
             iterations: 200,
             tolerance: 1e-3,
+            hold_sites: false,
         }
     }
 }
@@ -66,8 +70,8 @@ pub struct Refinement {
     pub after: f64,
     /// Steps taken, in all attempts.
     pub iterations: usize,
-    /// The norm of the gradient of the weighted error with respect to control points and sites, over that error, where the sites' greatest distance
-    /// from their centroid was 1 at the start.
+    /// The norm of the gradient of the weighted error with respect to control points and, unless held, sites, over that error, where the sites'
+    /// greatest distance from their centroid was 1 at the start.
     pub gradient: f64,
     /// The weight that the frames between frames had.
     pub between: f64,
@@ -134,8 +138,8 @@ impl Signals {
     }
 }
 
-/// Minimises the weighted error of the rows over the control points of `spline`, the `sites`, g and h of at most m dimensions, downhill from the
-/// given spline and sites; knots and parameters stay. None where there is nothing to refine: fewer than three sites, sites in a line, thin-plate
+/// Minimises the weighted error of the rows over the control points of `spline`, the `sites` unless held, g and h of at most m dimensions, downhill
+/// from the given spline and sites; knots and parameters stay. None where there is nothing to refine: fewer than three sites, sites in a line, thin-plate
 /// functions that are dependent along the curve, or fewer rows than sites.
 ///
 /// A step costs O(R^2 (l + m) + R l (l + r) + (k + l)^3) for R rows in r dimensions; every arithmetic operation has its place in a fixed order.
@@ -167,7 +171,10 @@ pub(super) fn minimise_until(
         control: normalise(&spline.control),
         sites: normalise(sites),
     };
-    let problem = Problem::new(rows, &spline.knots, m);
+    let problem = Problem {
+        sites_held: options.hold_sites,
+        ..Problem::new(rows, &spline.knots, m)
+    };
     let found = descend(&problem, start, options, enough)?;
     let error = found.projection.error;
     Some(Minimum {
@@ -178,12 +185,18 @@ pub(super) fn minimise_until(
             0.0
         },
         error,
-        signals: signals(problem, found, &frame, &spline.knots),
+        signals: signals(problem, found, &frame, spline, sites),
     })
 }
 
 /// The signals in the units of the pose plane.
-fn signals(problem: Problem, found: Descent, frame: &Frame, knots: &[f64]) -> Signals {
+fn signals(
+    problem: Problem,
+    found: Descent,
+    frame: &Frame,
+    spline: &Spline,
+    given: &[Point],
+) -> Signals {
     let coefficients = found.projection.coefficients();
     let weights = found.projection.design.kernel_weights(&coefficients);
     let restore = |points: &[Point]| points.iter().map(|&q| frame.restore(q)).collect();
@@ -191,11 +204,14 @@ fn signals(problem: Problem, found: Descent, frame: &Frame, knots: &[f64]) -> Si
     Signals {
         spline: Spline {
             control: restore(control),
-            knots: knots.to_vec(),
+            knots: spline.knots.clone(),
         },
         pose: PoseSignal {
             coefficients: in_given_units(frame, sites, &weights, coefficients.get(..3, ..)),
-            sites: restore(sites),
+            sites: match problem.sites_held {
+                true => given.to_vec(),
+                false => restore(sites),
+            },
         },
         offset: problem.mean,
         basis: found.projection.basis().to_owned(),

@@ -11,7 +11,7 @@ use crate::signal::thin_plate::kernel_gradients;
 /// A diagonal entry below this share of the greatest is damped like that one.
 const LEAST_DIAGONAL: f64 = 1e-12;
 
-/// J^T J and J^T E for the unknowns x of all control points, y of all control points, x of all sites, y of all sites.
+/// J^T J and J^T E for the unknowns x of all control points, y of all control points and, unless they are held, x of all sites, y of all sites.
 ///
 /// With P the projection on the columns of A, moving one unknown moves the residual by -(I - P) (dA) C H^T to first order: the rest is what g and h
 /// make up for. All of it lies in the m dimensions of H. A site's functions keep the side conditions because its move is made up for by the least
@@ -25,20 +25,27 @@ pub(super) struct Normal {
 impl Normal {
     /// O(R^2 (l + m) + R l^2), whatever the number of vertices.
     pub fn new(problem: &Problem, unknowns: &Unknowns, projection: &Projection) -> Self {
-        let moves = Moves::new(problem, unknowns, projection);
-        let (k, l) = (unknowns.control.len(), unknowns.sites.len());
+        let gradients = gradients(problem, unknowns, projection);
+        let moves = Moves::new(problem, projection, gradients.as_ref());
+        let k = unknowns.control.len();
+        let l = match problem.sites_held {
+            true => 0,
+            false => unknowns.sites.len(),
+        };
         let mut normal = Self {
             matrix: Mat::zeros(2 * (k + l), 2 * (k + l)),
             descent: Mat::zeros(2 * (k + l), 1),
         };
-        normal.add_controls(problem, &moves);
-        normal.add_sites(&moves, 2 * k);
-        normal.add_mixed(problem, &moves, 2 * k);
+        normal.add_controls(problem, &moves, k);
+        if !problem.sites_held {
+            let shifts = Shifts::new(problem, projection, gradients.as_ref());
+            normal.add_sites(&moves, &shifts, 2 * k);
+            normal.add_mixed(problem, &moves, &shifts, 2 * k);
+        }
         normal
     }
 
-    fn add_controls(&mut self, problem: &Problem, moves: &Moves) {
-        let k = (self.matrix.nrows() - 2 * moves.sites()) / 2;
+    fn add_controls(&mut self, problem: &Problem, moves: &Moves, k: usize) {
         for (a, b) in [(0, 0), (1, 0), (1, 1)] {
             let mut inner = product(moves.slopes[a].as_ref(), moves.slopes[b].transpose());
             for (column, outside) in inner.col_iter_mut().zip(moves.outside.col_iter()) {
@@ -68,33 +75,27 @@ impl Normal {
         }
     }
 
-    fn add_sites(&mut self, moves: &Moves, first: usize) {
-        let l = moves.sites();
-        let inner = product(
-            moves.shifts_outside.transpose(),
-            moves.shifts_outside.as_ref(),
-        );
+    fn add_sites(&mut self, moves: &Moves, shifts: &Shifts, first: usize) {
+        let l = moves.weights.nrows();
+        let inner = product(shifts.outside.transpose(), shifts.outside.as_ref());
         let weights = product(moves.weights.as_ref(), moves.weights.transpose());
         for j in 0..2 * l {
             for i in 0..2 * l {
                 self.matrix[(first + i, first + j)] = inner[(i, j)] * weights[(i % l, j % l)];
             }
         }
-        let change = product(
-            moves.shifts_outside.transpose(),
-            moves.residual_outside.as_ref(),
-        );
+        let change = product(shifts.outside.transpose(), moves.residual_outside.as_ref());
         for i in 0..2 * l {
             self.descent[(first + i, 0)] = change.row(i) * moves.weights.row(i % l).transpose();
         }
     }
 
-    fn add_mixed(&mut self, problem: &Problem, moves: &Moves, first: usize) {
-        let (l, k) = (moves.sites(), first / 2);
+    fn add_mixed(&mut self, problem: &Problem, moves: &Moves, shifts: &Shifts, first: usize) {
+        let (l, k) = (moves.weights.nrows(), first / 2);
         for a in 0..2 {
             let along = product(moves.slopes[a].as_ref(), moves.weights.transpose());
             let inner = Mat::from_fn(along.nrows(), 2 * l, |row, i| {
-                along[(row, i % l)] * moves.shifts[(row, i)]
+                along[(row, i % l)] * shifts.rows[(row, i)]
             });
             let block = gather_rows(&problem.splines, inner.as_ref(), k);
             let mut place = self.matrix.get_mut(first.., a * k..(a + 1) * k);
@@ -131,30 +132,25 @@ impl Normal {
     }
 }
 
-/// How the rows move with the unknowns, and what is left of them.
+/// How the rows move with the control points, and what is left of them.
 struct Moves {
     /// R x m, for x and y: g along the plane at each row.
     slopes: [Mat<f64>; 2],
     /// l x m: the weights g_j of the kernels.
     weights: Mat<f64>,
-    /// R x 2l: (I - P) times what a row gains, for a unit of g_j, from moving site j.
-    shifts: Mat<f64>,
-    /// (R - l) x 2l: the same in an orthonormal basis of the complement of A.
-    shifts_outside: Mat<f64>,
     /// I - P.
     outside: Mat<f64>,
     /// R x m: (I - P) Y H.
     residual: Mat<f64>,
+    /// (R - l) x m: the same in an orthonormal basis of the complement of A.
     residual_outside: Mat<f64>,
 }
 
 impl Moves {
-    fn new(problem: &Problem, unknowns: &Unknowns, projection: &Projection) -> Self {
-        let Projection { design, qr, .. } = projection;
-        let (count, l) = (projection.curve.len(), unknowns.sites.len());
+    fn new(problem: &Problem, projection: &Projection, gradients: MatRef<'_, f64>) -> Self {
         let coefficients = projection.coefficients();
-        let weights = design.kernel_weights(&coefficients);
-        let gradients = gradients(problem, unknowns, projection);
+        let weights = projection.design.kernel_weights(&coefficients);
+        let (count, l) = (gradients.nrows(), weights.nrows());
         let slopes = [0, 1].map(|axis| {
             let kernels = gradients.get(.., axis * l..(axis + 1) * l);
             let mut slope = product(kernels, weights.as_ref());
@@ -167,34 +163,49 @@ impl Moves {
             }
             slope
         });
-        let mut shifts = corrections(problem, projection);
-        shifts = Mat::from_fn(count, 2 * l, |row, i| {
-            -gradients[(row, i)] - shifts[(row, i / l)]
-        });
-        qr.apply_transpose(&mut shifts);
-        let shifts_outside = shifts.get(l.., ..).to_owned();
         let residual_outside = product(projection.rest.as_ref(), projection.basis());
-        let back = |outside: MatRef<'_, f64>| {
-            let mut rows = Mat::zeros(count, outside.ncols());
-            rows.get_mut(l.., ..).copy_from(outside);
-            qr.apply(&mut rows);
-            rows
-        };
-        let complement = back(Mat::identity(count - l, count - l).as_ref());
+        let complement = from_outside(projection, Mat::identity(count - l, count - l).as_ref());
         Self {
             slopes,
             weights,
-            shifts: back(shifts_outside.as_ref()),
             outside: product(complement.as_ref(), complement.transpose()),
-            residual: back(residual_outside.as_ref()),
-            shifts_outside,
+            residual: from_outside(projection, residual_outside.as_ref()),
             residual_outside,
         }
     }
+}
 
-    fn sites(&self) -> usize {
-        self.weights.nrows()
+/// How the rows move with the sites.
+struct Shifts {
+    /// R x 2l: (I - P) times what a row gains, for a unit of g_j, from moving site j.
+    rows: Mat<f64>,
+    /// (R - l) x 2l: the same in an orthonormal basis of the complement of A.
+    outside: Mat<f64>,
+}
+
+impl Shifts {
+    fn new(problem: &Problem, projection: &Projection, gradients: MatRef<'_, f64>) -> Self {
+        let (count, l) = (gradients.nrows(), gradients.ncols() / 2);
+        let corrections = corrections(problem, projection);
+        let mut gains = Mat::from_fn(count, 2 * l, |row, i| {
+            -gradients[(row, i)] - corrections[(row, i / l)]
+        });
+        projection.qr.apply_transpose(&mut gains);
+        let outside = gains.get(l.., ..).to_owned();
+        Self {
+            rows: from_outside(projection, outside.as_ref()),
+            outside,
+        }
     }
+}
+
+/// The rows of which these are the coordinates in an orthonormal basis of the complement of A.
+fn from_outside(projection: &Projection, outside: MatRef<'_, f64>) -> Mat<f64> {
+    let (count, l) = (projection.curve.len(), projection.svd.u.nrows());
+    let mut rows = Mat::zeros(count, outside.ncols());
+    rows.get_mut(l.., ..).copy_from(outside);
+    projection.qr.apply(&mut rows);
+    rows
 }
 
 /// R x 2l: the gradients of the kernels at the curve, x and then y, times the square roots of the weights.

@@ -32,9 +32,12 @@ pub(super) struct Problem {
     pub targets: Mat<f64>,
     /// The greatest dimension of the shape subspace.
     pub m: usize,
+    /// Whether the sites stay, and the control points alone move.
+    pub sites_held: bool,
 }
 
 impl Problem {
+    /// With sites that move.
     pub fn new(given: &Rows, knots: &[f64], m: usize) -> Self {
         let weight: f64 = given.weights.iter().sum();
         let mean: Vec<f64> = (0..given.targets.ncols())
@@ -53,6 +56,7 @@ impl Problem {
             roots,
             mean,
             m,
+            sites_held: false,
         }
     }
 }

@@ -163,6 +163,45 @@ fn a_descent_comes_down_to_what_meets_every_row() {
     assert!(found.error < 1e-12 * before, "{before} {found:?}");
 }
 
+/// The least error over the control points is flat there, and no site moves.
+#[test]
+fn a_descent_with_sites_held_ends_where_the_error_is_flat() {
+    let (rows, u, unknowns) = sample();
+    for m in [1, 3, 5] {
+        let spline = Spline {
+            control: unknowns.control.clone(),
+            knots: u.clone(),
+        };
+        let held = RefineOptions {
+            iterations: 2000,
+            tolerance: 1e-14,
+            hold_sites: true,
+            ..RefineOptions::default()
+        };
+        let found = minimise(&rows, &spline, &unknowns.sites, m, &held).unwrap();
+        assert_eq!(found.signals.pose.sites, unknowns.sites);
+        // The gradient is -2 J^T r: beside |r| and the size of what J is made of. Rounding in |r|^2 hides smaller ones.
+        let data = rows.targets.squared_norm_l2();
+        let flat = found.gradient * (found.error / data).sqrt();
+        assert!(
+            flat < 1e-6 && found.iterations < 2000,
+            "{m}: {flat} {found:?}"
+        );
+        let start = minimise(
+            &rows,
+            &spline,
+            &unknowns.sites,
+            m,
+            &RefineOptions {
+                iterations: 0,
+                ..held
+            },
+        );
+        assert!(found.error < start.unwrap().error);
+        assert!((found.signals.error(&rows) - found.error).abs() < 1e-11 * found.error);
+    }
+}
+
 #[test]
 fn a_refined_fit_is_what_its_errors_say() {
     let z = frames(30, 24);
