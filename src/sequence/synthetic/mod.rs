@@ -22,6 +22,7 @@ pub mod trot;
 
 mod biped;
 mod body;
+mod catalogue;
 #[cfg(test)]
 mod checks;
 mod cloth;
@@ -43,30 +44,11 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use self::animals::Animal;
-use self::motion::Motion;
+pub use self::catalogue::Entry;
+use self::catalogue::{CATALOGUE, Make};
 use super::format::stream::FrameStream;
 use super::{Sequence, SequenceError};
 use crate::mesh::{Connectivity, ConnectivityError};
-
-/// One embedded sequence: its name, its size and what it is good for.
-#[derive(Clone, Debug)]
-pub struct Entry {
-    /// The name with its `@`, as [`embedded`] takes it.
-    pub name: &'static str,
-    /// What moves and how, in one line.
-    pub summary: &'static str,
-    /// Number of frames n.
-    pub frames: usize,
-    /// Number of vertices V.
-    pub vertices: usize,
-    /// Number of triangles F.
-    pub faces: usize,
-    /// What it is good for, in one line.
-    pub good_for: &'static str,
-    build: fn() -> Result<Sequence, SyntheticError>,
-    /// The motion, where it has no end.
-    endless: Option<fn() -> Result<Motion, SyntheticError>>,
-}
 
 /// A named place of a body and the vertex nearest to it at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,8 +106,8 @@ pub const MOST_FRAMES: usize = 1_000_000;
 /// end.
 pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
     match asked(name)? {
-        Asked::Whole(entry) => (entry.build)(),
-        Asked::Endless(motion, frames) => motion()?.sequence(frames),
+        (Make::Whole(build), _) => build(),
+        (Make::Endless(motion), frames) => motion()?.sequence(frames),
     }
 }
 
@@ -133,31 +115,24 @@ pub fn embedded(name: &str) -> Result<Sequence, SyntheticError> {
 pub fn stream_embedded(name: &str) -> Result<FrameStream, SyntheticError> {
     let path = Path::new(name);
     match asked(name)? {
-        Asked::Whole(entry) => Ok(FrameStream::held(path, (entry.build)()?)),
-        Asked::Endless(motion, frames) => motion()?.stream(path, frames),
+        (Make::Whole(build), _) => Ok(FrameStream::held(path, build()?)),
+        (Make::Endless(motion), frames) => motion()?.stream(path, frames),
     }
 }
 
-enum Asked {
-    Whole(&'static Entry),
-    Endless(fn() -> Result<Motion, SyntheticError>, usize),
-}
-
-fn asked(name: &str) -> Result<Asked, SyntheticError> {
+/// How to make what a name asks for, and how many frames of it.
+fn asked(name: &str) -> Result<(&'static Make, usize), SyntheticError> {
     let Some((base, length)) = name.split_once(':') else {
         let entry = entry(name)?;
-        return Ok(match entry.endless {
-            Some(motion) => Asked::Endless(motion, entry.frames),
-            None => Asked::Whole(entry),
-        });
+        return Ok((&entry.make, entry.frames));
     };
     let length = length.parse().ok();
     let length = length.filter(|n| (1..=MOST_FRAMES).contains(n));
-    match (entry(base)?.endless, length) {
-        (Some(motion), Some(frames)) => Ok(Asked::Endless(motion, frames)),
+    match (&entry(base)?.make, length) {
+        (make @ Make::Endless(_), Some(frames)) => Ok((make, frames)),
         _ => Err(SyntheticError::BadLength {
             name: name.to_owned(),
-            endless: names(|entry| entry.endless.is_some()),
+            endless: names(|entry| matches!(entry.make, Make::Endless(_))),
         }),
     }
 }
@@ -217,289 +192,6 @@ fn smoothstep(from: f64, to: f64, at: f64) -> f64 {
     let u = ((at - from) / (to - from)).clamp(0.0, 1.0);
     u * u * (3.0 - 2.0 * u)
 }
-
-const CATALOGUE: &[Entry] = &[
-    Entry {
-        name: "@bar",
-        summary: "a box bar that bends by up to 150 degrees and twists by 300",
-        frames: 60,
-        vertices: 2050,
-        faces: 4096,
-        good_for: "deformation gradients, known in closed form at every point and frame",
-        build: || bar::build(&bar::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@bar-small",
-        summary: "@bar with fewer vertices and frames",
-        frames: 30,
-        vertices: 260,
-        faces: 516,
-        good_for: "tests of gradients",
-        build: || bar::build(&bar::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@roll",
-        summary: "a flat strip rolled up by 20 degrees a frame, to 700 degrees",
-        frames: 36,
-        vertices: 1331,
-        faces: 2400,
-        good_for: "isometry and rotations beyond a half turn: every triangle keeps its shape",
-        build: || roll::build(&roll::FULL, roll::FRAMES),
-        endless: None,
-    },
-    Entry {
-        name: "@roll-small",
-        summary: "@roll with fewer vertices",
-        frames: 36,
-        vertices: 164,
-        faces: 240,
-        good_for: "tests of isometry and of unwrapped rotations",
-        build: || roll::build(&roll::SMALL, roll::FRAMES),
-        endless: None,
-    },
-    Entry {
-        name: "@flag",
-        summary: "a cloth on a pole in a periodic wind, simulated",
-        frames: 100,
-        vertices: 3003,
-        faces: 5776,
-        good_for: "the size of the flag of Cashman & Hormann 2012, Table 1: F = 5776, n = 100, 9F + 3 = 51987",
-        build: || flag::build(&flag::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@flag-small",
-        summary: "@flag with a coarser cloth and fewer frames",
-        frames: 40,
-        vertices: 153,
-        faces: 256,
-        good_for: "tests on an open surface with a nearly periodic motion",
-        build: || flag::build(&flag::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@gallop",
-        summary: "a quadruped that gallops in place for two similar cycles of 12 frames",
-        frames: 24,
-        vertices: 4082,
-        faces: 8160,
-        good_for: "articulated motion as in Cashman & Hormann 2012, Figure 1; transfer, by its joint markers",
-        build: || gallop::build(Animal::Horse),
-        endless: None,
-    },
-    Entry {
-        name: "@gallop-small",
-        summary: "@gallop with a stouter animal of fewer vertices",
-        frames: 24,
-        vertices: 634,
-        faces: 1264,
-        good_for: "tests of articulated motion and of transfer between different connectivities",
-        build: || gallop::build(Animal::SmallHorse),
-        endless: None,
-    },
-    Entry {
-        name: "@jelly",
-        summary: "a soft animal lifted, swung, dropped, squashed and pulled by the head, simulated",
-        frames: 120,
-        vertices: 1502,
-        faces: 3000,
-        good_for: "large elastic deformation that never repeats, hard as the cow of Cashman & Hormann 2012, Figure 6",
-        build: || jelly::build(&jelly::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@jelly-small",
-        summary: "@jelly with fewer vertices, every third frame",
-        frames: 40,
-        vertices: 494,
-        faces: 984,
-        good_for: "tests of large elastic deformation",
-        build: || jelly::build(&jelly::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@book",
-        summary: "an open book whose pages share one spine and turn over one after another",
-        frames: 40,
-        vertices: 3225,
-        faces: 6144,
-        good_for: "a non-manifold mesh: eight triangles at every edge of the spine",
-        build: || book::build(&book::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@book-small",
-        summary: "@book with fewer pages and vertices",
-        frames: 40,
-        vertices: 310,
-        faces: 540,
-        good_for: "tests on non-manifold edges",
-        build: || book::build(&book::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@klein",
-        summary: "a Klein bottle in space whose section turns while it breathes",
-        frames: 36,
-        vertices: 3456,
-        faces: 6912,
-        good_for: "a closed surface with one side: no outward normal, no volume",
-        build: || klein::build(&klein::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@klein-small",
-        summary: "@klein with fewer vertices",
-        frames: 36,
-        vertices: 392,
-        faces: 784,
-        good_for: "tests on a surface that cannot be oriented",
-        build: || klein::build(&klein::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@character",
-        summary: "a person who does jumping jacks, bows and twists, and marches in place",
-        frames: 99,
-        vertices: 3835,
-        faces: 7666,
-        good_for: "the size of Cashman & Hormann 2012, Figure 5 and Table 1: V = 3835, n = 99, d = 11505; large turns of limbs",
-        build: || character::build(&character::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@character-small",
-        summary: "@character with stouter limbs and fewer vertices, every third frame",
-        frames: 33,
-        vertices: 682,
-        faces: 1360,
-        good_for: "tests of large turns of limbs",
-        build: || character::build(&character::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@trot",
-        summary: "a hound that trots in place for two similar cycles of 16 frames",
-        frames: 32,
-        vertices: 3726,
-        faces: 7448,
-        good_for: "transfer to or from @gallop, by the same joint markers on another connectivity",
-        build: || trot::build(Animal::Hound),
-        endless: None,
-    },
-    Entry {
-        name: "@trot-small",
-        summary: "@trot with a stouter animal of fewer vertices",
-        frames: 32,
-        vertices: 688,
-        faces: 1372,
-        good_for: "tests of transfer between different connectivities",
-        build: || trot::build(Animal::SmallHound),
-        endless: None,
-    },
-    Entry {
-        name: "@roam",
-        summary: "a quadruped in place that changes between gallop and trot and never repeats; @roam:5000 for 5,000 frames",
-        frames: roam::FRAMES,
-        vertices: 4082,
-        faces: 8160,
-        good_for: "sequences of any length: every frame is made by itself",
-        build: || roam::motion(Animal::Horse)?.sequence(roam::FRAMES),
-        endless: Some(|| roam::motion(Animal::Horse)),
-    },
-    Entry {
-        name: "@roam-small",
-        summary: "@roam with the animal of @gallop-small, fewer frames unless it says how many",
-        frames: roam::SMALL_FRAMES,
-        vertices: 634,
-        faces: 1264,
-        good_for: "tests of long sequences",
-        build: || roam::motion(Animal::SmallHorse)?.sequence(roam::SMALL_FRAMES),
-        endless: Some(|| roam::motion(Animal::SmallHorse)),
-    },
-    Entry {
-        name: "@gallop-poses",
-        summary: "the horse of @gallop at rest and in seven poses of its gallop",
-        frames: 8,
-        vertices: 4082,
-        faces: 8160,
-        good_for: "the source examples of a transfer with m = 7, as in Cashman & Hormann 2012, Figure 7",
-        build: || animals::build_poses(Animal::Horse),
-        endless: None,
-    },
-    Entry {
-        name: "@gallop-poses-small",
-        summary: "the horse of @gallop-small in the same poses",
-        frames: 8,
-        vertices: 634,
-        faces: 1264,
-        good_for: "tests of transfer by examples",
-        build: || animals::build_poses(Animal::SmallHorse),
-        endless: None,
-    },
-    Entry {
-        name: "@trot-poses",
-        summary: "the hound of @trot in the poses of @gallop-poses, one by one",
-        frames: 8,
-        vertices: 3726,
-        faces: 7448,
-        good_for: "the target examples of a transfer of @gallop",
-        build: || animals::build_poses(Animal::Hound),
-        endless: None,
-    },
-    Entry {
-        name: "@trot-poses-small",
-        summary: "the hound of @trot-small in the same poses",
-        frames: 8,
-        vertices: 688,
-        faces: 1372,
-        good_for: "tests of transfer by examples",
-        build: || animals::build_poses(Animal::SmallHound),
-        endless: None,
-    },
-    Entry {
-        name: "@face",
-        summary: "nine expressions of one face, the neutral one first",
-        frames: 9,
-        vertices: 3200,
-        faces: 6144,
-        good_for: "designing a sequence from poses, as in Cashman & Hormann 2012, Figure 8",
-        build: || face::build(&face::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@face-small",
-        summary: "@face with fewer vertices",
-        frames: 9,
-        vertices: 480,
-        faces: 864,
-        good_for: "tests of design from poses",
-        build: || face::build(&face::SMALL),
-        endless: None,
-    },
-    Entry {
-        name: "@loop",
-        summary: "a rubber ring round which a bulge and a wave run, one whole period",
-        frames: 32,
-        vertices: 2688,
-        faces: 5376,
-        good_for: "looping: the last frame leads into the first",
-        build: || ring::build(&ring::FULL),
-        endless: None,
-    },
-    Entry {
-        name: "@loop-small",
-        summary: "@loop with fewer vertices",
-        frames: 32,
-        vertices: 396,
-        faces: 792,
-        good_for: "tests of looping, and of a closed surface with a handle",
-        build: || ring::build(&ring::SMALL),
-        endless: None,
-    },
-];
 
 #[cfg(test)]
 mod tests {
