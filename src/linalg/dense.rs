@@ -3,8 +3,11 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
-use faer::linalg::{evd, householder, qr, svd, triangular_solve};
-use faer::{Accum, Conj, Mat, MatMut, MatRef, Par, diag::Diag};
+use faer::linalg::qr::no_pivoting::factor::{
+    QrParams, qr_in_place, qr_in_place_scratch, recommended_block_size,
+};
+use faer::linalg::{evd, householder, svd, triangular_solve};
+use faer::{Accum, Auto, Conj, Mat, MatMut, MatRef, Par, Spec, diag::Diag};
 use thiserror::Error;
 
 use super::kernels::{axpy, clear_upper_halves, dot};
@@ -21,6 +24,27 @@ pub enum FactorError {
         rows: usize,
         columns: usize,
     },
+}
+
+/// The exponent of the greatest entry when faer factors a matrix. Its norms also sum the squares of entries times 2^-511, which are denormal for entries
+/// below 1, and each then costs hundreds of cycles. Here entries down to 2^-256 of the greatest stay clear of that, and squares of all of them of infinity.
+const LIFTED: i32 = 256;
+
+/// The power of two that lifts a matrix so: factorisations of it have the same bits but for the scale.
+fn lift(a: MatRef<'_, f64>) -> f64 {
+    let columns = (0..a.ncols()).map(|j| a.col(j).norm_max());
+    let greatest = columns.fold(0.0, f64::max);
+    if !greatest.is_normal() {
+        return 1.0;
+    }
+    let exponent = (greatest.to_bits() >> 52) as i32 - 1023;
+    2f64.powi((LIFTED - exponent).min(1000))
+}
+
+fn scale_by(mut a: MatMut<'_, f64>, factor: f64) {
+    for j in 0..a.ncols() {
+        a.as_mut().col_mut(j).iter_mut().for_each(|x| *x *= factor);
+    }
 }
 
 /// C := A B, or C + A B, on one thread.
@@ -101,6 +125,21 @@ pub fn thin_svd(a: MatRef<'_, f64>) -> Result<ThinSvd, FactorError> {
     })
 }
 
+/// How a QR factorisation goes through a matrix: small ones in blocks of 16 columns without blocks in these, which measured is twice as fast as faer's
+/// defaults at 200 x 140 and at 100 x 50.
+fn blocks(rows: usize, columns: usize) -> (usize, Spec<QrParams, f64>) {
+    let mut parameters = <QrParams as Auto<f64>>::auto();
+    let recommended = recommended_block_size::<f64>(rows, columns);
+    if rows * columns > SMALL {
+        return (recommended, parameters.into());
+    }
+    parameters.blocking_threshold = UNBLOCKED;
+    (rows.min(columns).clamp(1, 16), parameters.into())
+}
+
+const SMALL: usize = 512 * 512;
+const UNBLOCKED: usize = 100 * 100;
+
 /// A Householder QR factorisation, Q in its implicit form.
 pub struct Qr {
     factors: Mat<f64>,
@@ -111,23 +150,23 @@ impl Qr {
     /// Factors A (rows x columns), overwriting it. O(rows columns min(rows, columns)).
     pub fn new(mut a: Mat<f64>) -> Self {
         let (rows, columns) = a.shape();
-        let block = qr::no_pivoting::factor::recommended_block_size::<f64>(rows, columns);
+        let lift = lift(a.as_ref());
+        scale_by(a.as_mut(), lift);
+        let (block, parameters) = blocks(rows, columns);
         let mut coefficients = Mat::zeros(block, rows.min(columns));
-        let scratch = qr::no_pivoting::factor::qr_in_place_scratch::<f64>(
-            rows,
-            columns,
-            block,
-            Par::Seq,
-            Default::default(),
-        );
-        qr::no_pivoting::factor::qr_in_place(
+        let scratch = qr_in_place_scratch::<f64>(rows, columns, block, Par::Seq, parameters);
+        qr_in_place(
             a.as_mut(),
             coefficients.as_mut(),
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
-            Default::default(),
+            parameters,
         );
         clear_upper_halves();
+        for j in 0..columns {
+            let r = a.col_as_slice_mut(j).iter_mut().take(j + 1);
+            r.for_each(|x| *x /= lift);
+        }
         Self {
             factors: a,
             coefficients,
