@@ -118,23 +118,6 @@ vectorised! {
     }
 }
 
-vectorised! {
-    /// [`axpy4`] for four vectors y, reading every x once; the bits are those of one y after the other.
-    pub fn axpy4x4(a: [[f64; 4]; 4], x: [&[f64]; 4], y: [&mut [f64]; 4]) {
-        let n = x[0].len();
-        let [x0, x1, x2, x3] = x.map(|x| &x[..n]);
-        let [y0, y1, y2, y3] = y.map(|y| &mut y[..n]);
-        for i in 0..n {
-            let x = [x0[i], x1[i], x2[i], x3[i]];
-            let add = |a: [f64; 4]| (a[0] * x[0] + a[1] * x[1]) + (a[2] * x[2] + a[3] * x[3]);
-            y0[i] += add(a[0]);
-            y1[i] += add(a[1]);
-            y2[i] += add(a[2]);
-            y3[i] += add(a[3]);
-        }
-    }
-}
-
 /// The inner products of the columns `x(j)`, j < count, of a matrix with y.
 pub fn project<'a>(
     count: usize,
@@ -162,25 +145,6 @@ pub fn combine<'a>(a: &[f64], x: impl Fn(usize) -> &'a [f64], y: &mut [f64]) {
     }
     for (j, &a) in a.iter().enumerate().skip(whole) {
         axpy(a, x(j), y);
-    }
-}
-
-/// [`combine`] for four vectors y with weights of their own, all of one length, reading the columns once; with the same bits.
-pub fn combine4<'a>(a: [&[f64]; 4], x: impl Fn(usize) -> &'a [f64], y: [&mut [f64]; 4]) {
-    let count = a[0].len();
-    let whole = count / 4 * 4;
-    let [y0, y1, y2, y3] = y;
-    for j in (0..whole).step_by(4) {
-        axpy4x4(
-            a.map(|a| [a[j], a[j + 1], a[j + 2], a[j + 3]]),
-            [x(j), x(j + 1), x(j + 2), x(j + 3)],
-            [&mut *y0, &mut *y1, &mut *y2, &mut *y3],
-        );
-    }
-    for (a, y) in a.iter().zip([y0, y1, y2, y3]) {
-        for (j, &a) in a.iter().enumerate().skip(whole) {
-            axpy(a, x(j), y);
-        }
     }
 }
 

@@ -5,6 +5,7 @@ pub mod appended_qr;
 pub mod banded;
 pub mod dense;
 pub mod kernels;
+pub mod panels;
 pub mod pca;
 pub mod rotation;
 pub mod sparse;

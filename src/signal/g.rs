@@ -7,15 +7,14 @@ use thiserror::Error;
 use super::Point;
 use super::thin_plate::{Frame, kernels};
 use crate::linalg::dense::Qr;
-use crate::linalg::kernels::{axpy, combine, combine4};
+use crate::linalg::kernels::{axpy, combine};
+use crate::linalg::panels::Panels;
 
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
 
 /// Points evaluated together.
 const TOGETHER: usize = 32;
-/// Columns of coefficients taken at a time then; a multiple of the four that [`combine`] takes, so that sums keep their order.
-const COLUMNS: usize = 32;
 
 /// g(p) = g_0 + sum_j phi(||s_j - p||) g_j + G p, with phi(r) = r^2 ln r, in the units of the pose-space positions.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,36 +96,36 @@ impl PoseSignal {
         let m = self.coefficients.nrows();
         let mut values = vec![0.0; m * points.len()];
         if m > 0 {
+            let panels = Panels::new(self.coefficients.get(.., 1..self.sites.len() + 1));
             values
                 .par_chunks_mut(m * TOGETHER)
                 .zip(points.par_chunks(TOGETHER))
-                .for_each(|(x, points)| self.evaluate_together(points, x));
+                .for_each(|(x, points)| self.evaluate_together(&panels, points, x));
         }
         MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
     }
 
-    /// g at a few points, m numbers each: the coefficients go through the cache once for all of them.
-    fn evaluate_together(&self, points: &[Point], values: &mut [f64]) {
+    /// g at a few points, m numbers each.
+    fn evaluate_together(&self, panels: &Panels, points: &[Point], values: &mut [f64]) {
         let (l, m) = (self.sites.len(), self.coefficients.nrows());
         let mut bends = vec![0.0; l * points.len()];
         for (i, (x, &p)) in values.chunks_exact_mut(m).zip(points).enumerate() {
             kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
             x.copy_from_slice(self.coefficients.col_as_slice(0));
         }
-        for first in (0..l).step_by(COLUMNS) {
-            let last = (first + COLUMNS).min(l);
-            let column = |j: usize| self.coefficients.col_as_slice(first + j + 1);
-            let weights = |i: usize| &bends[i * l + first..i * l + last];
-            let mut fours = values.chunks_exact_mut(4 * m);
-            for (four, x) in fours.by_ref().enumerate() {
-                let (low, high) = x.split_at_mut(2 * m);
-                let ((x0, x1), (x2, x3)) = (low.split_at_mut(m), high.split_at_mut(m));
-                let weights = [0, 1, 2, 3].map(|i| weights(4 * four + i));
-                combine4(weights, column, [x0, x1, x2, x3]);
-            }
-            for (i, x) in fours.into_remainder().chunks_exact_mut(m).enumerate() {
-                combine(weights(points.len() / 4 * 4 + i), column, x);
-            }
+        let weights = |i: usize| &bends[i * l..(i + 1) * l];
+        let mut fours = values.chunks_exact_mut(4 * m);
+        for (four, x) in fours.by_ref().enumerate() {
+            let (low, high) = x.split_at_mut(2 * m);
+            let ((x0, x1), (x2, x3)) = (low.split_at_mut(m), high.split_at_mut(m));
+            panels.combine4(
+                [0, 1, 2, 3].map(|i| weights(4 * four + i)),
+                [x0, x1, x2, x3],
+            );
+        }
+        for (i, x) in fours.into_remainder().chunks_exact_mut(m).enumerate() {
+            let column = |j: usize| self.coefficients.col_as_slice(j + 1);
+            combine(weights(points.len() / 4 * 4 + i), column, x);
         }
         for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
             axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
