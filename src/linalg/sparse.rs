@@ -161,6 +161,7 @@ impl Factor {
             return Err(FactorError::NotPositiveDefinite { pivot: index, n });
         }
         self.sweeps.clear();
+        self.sweeps.reserve(each_supernode(symbolic, &self.values));
         for supernode in each_supernode(symbolic, &self.values) {
             self.sweeps.push(supernode);
         }

@@ -46,6 +46,24 @@ impl Sweeps {
         self.values.clear();
     }
 
+    /// Makes room for all of these columns of L.
+    pub fn reserve<'a>(&mut self, supernodes: impl Iterator<Item = Supernode<'a>>) {
+        let (mut panels, mut rows, mut values) = (0, 0, 0);
+        for supernode in supernodes {
+            let height = supernode.columns + supernode.pattern.len();
+            for first in (0..supernode.columns).step_by(WIDTH) {
+                let width = WIDTH.min(supernode.columns - first);
+                let below = height - first - width;
+                panels += 1;
+                rows += below;
+                values += width * (width + 1) / 2 + width * below;
+            }
+        }
+        self.panels.reserve_exact(panels);
+        self.rows.reserve_exact(rows);
+        self.values.reserve_exact(values);
+    }
+
     /// Appends the next columns of L. Rows that hold nothing but zeros, as relaxed supernodes have, are left out.
     pub fn push(&mut self, supernode: Supernode) {
         for first in (0..supernode.columns).step_by(WIDTH) {
