@@ -6,9 +6,7 @@ use super::signal::Choice;
 use crate::sequence::dataset::{DataFolders, DatasetError};
 use crate::sequence::{Sequence, SequenceError};
 use crate::shape::{ShapeError, prepare_for};
-use crate::signal::fit::FitOptions;
 use crate::signal::in_space::{SpaceFitError, fit_in_space, sample_in_space};
-use crate::signal::layout::Layout;
 use crate::signal::transfer::{TransferError, transfer_motion};
 
 /// What is made of a dataset.
@@ -64,12 +62,7 @@ pub fn make(
 
 fn resampled(given: &Sequence, choice: &Choice) -> Result<Sequence, MadeError> {
     let space = prepare_for(choice.space, given.connectivity(), given.positions())?;
-    let options = FitOptions {
-        knots: choice.knots,
-        layout: Layout::Mds,
-        ..FitOptions::new(choice.k, choice.l, choice.m)
-    };
-    let found = fit_in_space(&*space, given.positions(), &options)?;
+    let found = fit_in_space(&*space, given.positions(), &choice.options())?;
     let times: Vec<f64> = (2..=2 * given.frame_count())
         .map(|i| i as f64 / 2.0)
         .collect();
