@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use common::{Scratch, contents, meshseq, sheet, text};
-use meshseq::sequence::format::write;
+use meshseq::arrays::Bundle;
+use meshseq::sequence::format::{npz, write};
 
 /// A refusal: exit code 2, one line on standard error that holds every one of these words, nothing on standard output, and the folder as it was.
 #[track_caller]
@@ -45,6 +46,21 @@ fn assert_refusal(output: &Output, arguments: &[&str], words: &[&str]) {
     assert!(ours || said.starts_with("error: "), "{arguments:?}: {said}");
     assert!(said.len() < 1200, "{arguments:?}: {} bytes", said.len());
     assert_eq!(text(&output.stdout), "", "{arguments:?}");
+}
+
+/// What an NPZ file holds.
+fn bundle(path: &Path) -> Bundle {
+    Bundle(npz::read_arrays(path).unwrap().into_iter().collect())
+}
+
+/// Writes `bundle` with something changed.
+fn changed(bundle: &Bundle, change: impl FnOnce(&mut Bundle), path: &Path) {
+    let mut bundle = bundle.clone();
+    change(&mut bundle);
+    let arrays: Vec<_> = (bundle.0.iter())
+        .map(|(name, a)| (name.as_str(), a.clone()))
+        .collect();
+    npz::write_arrays(path, &arrays).unwrap();
 }
 
 /// Names, sizes and times: what has changed shows, and large files need not be read.

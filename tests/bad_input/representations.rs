@@ -3,11 +3,10 @@
 use std::fs;
 
 use meshseq::arrays::{Array, Bundle};
-use meshseq::sequence::format::npz;
 use meshseq::signal::file::load;
 
 use super::common::{Scratch, must};
-use super::{good, refused};
+use super::{bundle, changed, good, refused};
 
 struct Bad {
     scratch: Scratch,
@@ -17,24 +16,14 @@ struct Bad {
 impl Bad {
     fn new() -> Self {
         let scratch = good();
-        let arrays = npz::read_arrays(&scratch.at("rep.npz")).unwrap();
-        Self {
-            scratch,
-            good: Bundle(arrays.into_iter().collect()),
-        }
+        let good = bundle(&scratch.at("rep.npz"));
+        Self { scratch, good }
     }
 
     /// A good representation with something changed is refused with these words.
     #[track_caller]
     fn with(&self, change: impl FnOnce(&mut Bundle), words: &[&str]) {
-        let mut bundle = self.good.clone();
-        change(&mut bundle);
-        let arrays: Vec<_> = bundle
-            .0
-            .iter()
-            .map(|(name, a)| (name.as_str(), a.clone()))
-            .collect();
-        npz::write_arrays(&self.scratch.at("bad.npz"), &arrays).unwrap();
+        changed(&self.good, change, &self.scratch.at("bad.npz"));
         self.refused("bad.npz", words);
     }
 
@@ -226,8 +215,7 @@ fn patches_that_are_none() {
         .chain(places)
         .collect();
     must(&arguments);
-    let arrays = npz::read_arrays(&bad.scratch.at("patch.npz")).unwrap();
-    bad.good = Bundle(arrays.into_iter().collect());
+    bad.good = bundle(&bad.scratch.at("patch.npz"));
     let labels = bad.good.integers("patches").unwrap().to_vec();
     let with = |change: fn(&mut Vec<i64>), words: &[&str]| {
         let mut labels = labels.clone();

@@ -1,10 +1,9 @@
 //! Windows that cannot be, and files of windows that are none.
 
 use meshseq::arrays::{Array, Bundle};
-use meshseq::sequence::format::npz;
 
 use super::common::{Scratch, must};
-use super::{good, refused};
+use super::{bundle, changed, good, refused};
 
 const FIT: [&str; 6] = ["--k", "4", "--l", "3", "--m", "2"];
 
@@ -77,24 +76,23 @@ fn windows_that_cannot_be() {
 #[test]
 fn frames_that_are_bad_in_a_later_window() {
     let scratch = good();
-    let arrays = npz::read_arrays(&scratch.at("good.npz")).unwrap();
-    let mut bundle = Bundle(arrays.into_iter().collect());
-    let Some(Array::F64 { shape, data }) = bundle.0.get_mut("V") else {
-        panic!()
+    let long = |bundle: &mut Bundle| {
+        let Some(Array::F64 { shape, data }) = bundle.0.get_mut("V") else {
+            panic!()
+        };
+        let frame = data[..data.len() / 6].to_vec();
+        *data = (0..40)
+            .flat_map(|i| frame.iter().map(move |x| x * (1.0 + 0.01 * f64::from(i))))
+            .collect();
+        shape[0] = 40;
+        let at = data.len() - frame.len() + 4;
+        data[at] = f64::NAN;
     };
-    let frame = data[..data.len() / 6].to_vec();
-    *data = (0..40)
-        .flat_map(|i| frame.iter().map(move |x| x * (1.0 + 0.01 * f64::from(i))))
-        .collect();
-    shape[0] = 40;
-    let at = data.len() - frame.len() + 4;
-    data[at] = f64::NAN;
-    let arrays: Vec<_> = bundle
-        .0
-        .iter()
-        .map(|(n, a)| (n.as_str(), a.clone()))
-        .collect();
-    npz::write_arrays(&scratch.at("late.npz"), &arrays).unwrap();
+    changed(
+        &bundle(&scratch.at("good.npz")),
+        long,
+        &scratch.at("late.npz"),
+    );
     let late = scratch.arg("late.npz");
     let words = ["late.npz", "frame 40 (1-based), vertex 1", "finite"];
     fit(&scratch, &late, &["--window", "12"], &words);
@@ -118,23 +116,13 @@ impl Bad {
         let fit = ["signal", "fit", "@roam-small:20", "--window", "12"];
         let space = ["--space", space, "-o", &rep];
         must(&[&fit, &FIT[..], &space].concat());
-        let arrays = npz::read_arrays(&scratch.at("windows.npz")).unwrap();
-        Self {
-            scratch,
-            good: Bundle(arrays.into_iter().collect()),
-        }
+        let good = bundle(&scratch.at("windows.npz"));
+        Self { scratch, good }
     }
 
     #[track_caller]
     fn with(&self, change: impl FnOnce(&mut Bundle), words: &[&str]) {
-        let mut bundle = self.good.clone();
-        change(&mut bundle);
-        let arrays: Vec<_> = bundle
-            .0
-            .iter()
-            .map(|(n, a)| (n.as_str(), a.clone()))
-            .collect();
-        npz::write_arrays(&self.scratch.at("bad.npz"), &arrays).unwrap();
+        changed(&self.good, change, &self.scratch.at("bad.npz"));
         let words = [words, &["bad.npz"]].concat();
         let [bad, out] = ["bad.npz", "out"].map(|name| self.scratch.arg(name));
         for out in [out.clone() + ".npz", out.clone() + ".pc2", out] {

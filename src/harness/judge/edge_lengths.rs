@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix2, Matrix3x2, Vector3};
+use nalgebra::{Matrix2, Vector3};
 
 use super::Measured;
-use super::encoding::{Mesh, Vertices, decoded_own, edges, paired_rows, rotation};
-use super::forms::{PairPlace, axes, dihedral, fans, in_plane, turn_gap};
+use super::encoding::{Mesh, Vertices, decoded_own, edges, paired_rows, placement_difference};
+use super::forms::{PairPlace, dihedral, fans, in_plane, placement_gap, turn_gap};
 use crate::arrays::{ArrayError, Bundle};
 
 /// Differences of so much, root mean square, are rounding and have no direction.
@@ -93,17 +93,11 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
         lengths = rest.iter().fold(lengths, |most, x| most.max(x.abs()));
         let six = z[layout.components..].chunks_exact(6);
         for (vertices, numbers) in components.iter().zip(six) {
-            placed = placed.max(mesh.centre_gap(frame, vertices, &numbers[3..]));
-            let inside = |f: &&[u32; 3]| mesh.is_sound(f) && vertices.contains(&(f[0] as usize));
-            placed = placed.max(match mesh.faces.iter().find(inside) {
-                Some(root) => {
-                    let (then, now) = (edges(mesh.reference, root), edges(frame, root));
-                    let form = root_of(in_plane(now) * inverse(in_plane(then)));
-                    let mapped = rotation(&numbers[..3]) * axes(then) * form * in_plane(then);
-                    (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
-                }
-                None => numbers[..3].iter().map(|x| x.abs()).fold(0.0, f64::max),
-            });
+            let form = |f: usize| {
+                let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
+                root_of(in_plane(now) * inverse(in_plane(then)))
+            };
+            placed = placed.max(placement_gap(&mesh, vertices, frame, numbers, form));
         }
     }
     Ok(vec![
@@ -144,11 +138,8 @@ pub fn against(
         for pair in &layout.pairs {
             angles = angles.max(turn_gap(a[pair.place], b[pair.place]));
         }
-        let parts = a[layout.components..].chunks_exact(6);
-        for (a, b) in parts.zip(b[layout.components..].chunks_exact(6)) {
-            placed = placed.max((rotation(&a[..3]) - rotation(&b[..3])).amax());
-            placed = placed.max(super::greatest(&a[3..], &b[3..]));
-        }
+        let [a, b] = [a, b].map(|z| &z[layout.components..]);
+        placed = placed.max(placement_difference(a, b));
     }
     Ok(vec![
         ("length_difference", lengths),
@@ -253,11 +244,19 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
     if rms <= ROUNDING {
         return [0.0, rms];
     }
-    let cosine = |slope: f64, square: f64| slope.abs() / (square * energy).sqrt();
+    // A triangle without an area has no derivatives: a frame that has one is not stationary.
+    let cosine = |slope: f64, square: f64| {
+        let cosine = slope.abs() / (square * energy).sqrt();
+        if cosine.is_nan() {
+            f64::INFINITY
+        } else {
+            cosine
+        }
+    };
     let all = slopes
         .iter()
         .flat_map(|[slope, square]| slope.iter().zip(square.iter()));
-    let held = all.filter(|(_, square)| **square > 0.0);
+    let held = all.filter(|(_, square)| **square != 0.0);
     [
         held.map(|(slope, square)| cosine(*slope, *square))
             .fold(0.0, f64::max),

@@ -155,6 +155,16 @@ pub(super) fn paired_rows<'a>(
     Ok(a.chunks_exact(d).zip(b.chunks_exact(d)))
 }
 
+/// How far apart the rotations and centres of components are, six numbers each.
+pub(super) fn placement_difference(a: &[f64], b: &[f64]) -> f64 {
+    let gap = |a: &[f64], b: &[f64]| {
+        let turned = (rotation(&a[..3]) - rotation(&b[..3])).amax();
+        turned.max(greatest(&a[3..], &b[3..]))
+    };
+    let both = a.chunks_exact(6).zip(b.chunks_exact(6));
+    both.map(|(a, b)| gap(a, b)).fold(0.0, f64::max)
+}
+
 pub fn gradient_against(
     inputs: &Bundle,
     ours: &Bundle,

@@ -6,7 +6,7 @@ use std::f64::consts::{SQRT_2, TAU};
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
 use super::Measured;
-use super::encoding::{Mesh, Vertices, edges, paired_rows, rotation};
+use super::encoding::{Mesh, Vertices, edges, paired_rows, placement_difference, rotation};
 use crate::arrays::{ArrayError, Bundle};
 
 /// Where the numbers of a mesh are in z.
@@ -88,7 +88,7 @@ pub(super) fn in_plane(e: [Vector3<f64>; 2]) -> Matrix2<f64> {
 }
 
 /// The reference triangle's axes in space, 3 x 2.
-pub(super) fn axes(e: [Vector3<f64>; 2]) -> Matrix3x2<f64> {
+fn axes(e: [Vector3<f64>; 2]) -> Matrix3x2<f64> {
     let second = e[0].cross(&e[1]).cross(&e[0]).normalize();
     Matrix3x2::from_columns(&[e[0].normalize(), second])
 }
@@ -129,6 +129,27 @@ pub(super) fn turn_gap(a: f64, b: f64) -> f64 {
     gap.min(TAU - gap)
 }
 
+/// How far a component's rotation and centre are from where its vertices are: the rotation takes its first sound triangle, stretched by its form, to the
+/// frame, and is 0 where there is none.
+pub(super) fn placement_gap(
+    mesh: &Mesh,
+    vertices: &[usize],
+    frame: Vertices,
+    numbers: &[f64],
+    form: impl Fn(usize) -> Matrix2<f64>,
+) -> f64 {
+    let inside = |f: &[u32; 3]| mesh.is_sound(f) && vertices.contains(&(f[0] as usize));
+    let turned = match mesh.faces.iter().position(inside) {
+        Some(f) => {
+            let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
+            let mapped = rotation(&numbers[..3]) * axes(then) * form(f) * in_plane(then);
+            (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
+        }
+        None => numbers[..3].iter().map(|x| x.abs()).fold(0.0, f64::max),
+    };
+    turned.max(mesh.centre_gap(frame, vertices, &numbers[3..]))
+}
+
 pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
     let layout = Layout::new(&mesh.faces);
@@ -163,20 +184,8 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
             .iter()
             .zip(z[layout.components..].chunks_exact(6))
         {
-            let found = &numbers[3..];
-            placed = placed.max(mesh.centre_gap(frame, vertices, found));
-            let inside = |f: &&[u32; 3]| mesh.is_sound(f) && vertices.contains(&(f[0] as usize));
-            let root = mesh.faces.iter().position(|f| inside(&f));
-            placed = placed.max(match root {
-                Some(f) => {
-                    let rest = edges(mesh.reference, &mesh.faces[f]);
-                    let u = form(z, &layout.halves[f]);
-                    let now = edges(frame, &mesh.faces[f]);
-                    let mapped = rotation(&numbers[..3]) * axes(rest) * u * in_plane(rest);
-                    (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
-                }
-                None => numbers[..3].iter().map(|x| x.abs()).fold(0.0, f64::max),
-            });
+            let form = |f: usize| form(z, &layout.halves[f]);
+            placed = placed.max(placement_gap(&mesh, vertices, frame, numbers, form));
         }
     }
     Ok(vec![
@@ -206,11 +215,8 @@ pub fn against(
                 false => forms = forms.max((a[i] - b[i]).abs()),
             }
         }
-        let parts = a[layout.components..].chunks_exact(6);
-        for (a, b) in parts.zip(b[layout.components..].chunks_exact(6)) {
-            placed = placed.max((rotation(&a[..3]) - rotation(&b[..3])).amax());
-            placed = placed.max(super::greatest(&a[3..], &b[3..]));
-        }
+        let [a, b] = [a, b].map(|z| &z[layout.components..]);
+        placed = placed.max(placement_difference(a, b));
     }
     Ok(vec![
         ("form_difference", forms),
