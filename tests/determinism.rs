@@ -96,7 +96,6 @@ fn conversions_and_samples_do_not_depend_on_threads() {
     let fit = "signal fit @gallop-small --k 14 --l 12 --m 7 -o";
     must(&words(&format!("{fit} {rep}")));
     // Windows of 13 frames.
-    let fit = "signal fit @gallop-small --k 12 --l 10 --m 7 -o";
     must(&words(&format!("{fit} {windows} --window 18")));
     for name in ["a.npz", "a.pc2", "frames"] {
         same_bytes(name, |out| words(&format!("convert @jelly-small {out}")));
