@@ -1,10 +1,10 @@
 //! `convert SEQ OUT`: another format.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::say;
+use super::output::{check_not_input, say};
 use super::{FrameChoice, Outcome};
 use crate::sequence::format::write;
 
@@ -12,7 +12,7 @@ use crate::sequence::format::write;
 pub struct Convert {
     /// A folder or pattern of OBJ frames, an .npz, a .pc2, or @name
     sequence: String,
-    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    /// Where to: .npz, .pc2 (with an .obj beside it), or a new folder of OBJ frames
     out: PathBuf,
     #[command(flatten)]
     frames: FrameChoice,
@@ -20,6 +20,7 @@ pub struct Convert {
 
 impl Convert {
     pub fn run(self) -> Outcome {
+        check_not_input(&self.out, &[Path::new(&self.sequence)])?;
         let sequence = self.frames.open(&self.sequence)?;
         write(&sequence, &self.out)?;
         say(&format!(

@@ -46,11 +46,13 @@ enum Verb {
     Measure(run::Measure),
     /// Two records side by side: what got worse, what got better
     #[command(
-        after_help = "Example: meshseq compare results/2026-11-22.1 target/meshseq/2026-11-23.1"
+        after_help = "Example, in the folder of the project: meshseq compare results/2026-11-24.1 results/2026-11-24.2"
     )]
     Compare(compare::Compare),
     /// Make a record's HTML report again, or put its table into a README
-    #[command(after_help = "Example: meshseq report results/2026-11-22.1")]
+    #[command(
+        after_help = "Example, in the folder of the project: meshseq report results/2026-11-24.2"
+    )]
     Report(report::Report),
     /// Cases, stages, engines or faults
     #[command(after_help = "Example: meshseq list signal")]
@@ -66,7 +68,7 @@ enum Verb {
     )]
     Info(info::Info),
     /// A sequence in another format
-    #[command(after_help = "Example: meshseq convert @gallop-small gallop.npz")]
+    #[command(after_help = "Example: meshseq convert @gallop-small gallop-frames.npz")]
     Convert(convert::Convert),
     /// Cashman & Hormann 2012: time, pose and shape signals
     #[command(subcommand)]
@@ -93,6 +95,11 @@ struct FrameChoice {
 }
 
 impl FrameChoice {
+    /// Whether nothing was chosen.
+    fn is_all(&self) -> bool {
+        self.frames == ".." && self.every == 1
+    }
+
     fn open(&self, argument: &str) -> Result<Sequence, Failure> {
         let frames = self.parsed()?;
         let sequence = open(argument)?;

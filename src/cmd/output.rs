@@ -19,6 +19,9 @@ pub enum OutputError {
     /// The name of a folder where that of a file is needed.
     #[error("{}: cannot write, because it is a folder; name a file", .path.display())]
     IsFolder { path: PathBuf },
+    /// What is read would be lost.
+    #[error("{}: cannot write, because it is what is read; name another place", .path.display())]
+    IsInput { path: PathBuf },
     /// The operating system refused: no room, no permission.
     #[error("{}: cannot write: {source}; nothing was written, make room or choose another place and repeat", .path.display())]
     Refused { path: PathBuf, source: io::Error },
@@ -26,19 +29,35 @@ pub enum OutputError {
 
 /// An error where a file could not be written because of where it is to go; to be asked before long work.
 pub fn check_place(path: &Path) -> Result<(), OutputError> {
+    if path.is_dir() {
+        return Err(OutputError::IsFolder { path: path.into() });
+    }
+    check_parent(path)
+}
+
+/// An error where nothing could be written because the folder above does not exist.
+pub fn check_parent(path: &Path) -> Result<(), OutputError> {
     let parent = path.parent().unwrap_or(path);
     let folder = match parent.as_os_str().is_empty() {
         true => Path::new("."),
         false => parent,
     };
-    if path.is_dir() {
-        return Err(OutputError::IsFolder { path: path.into() });
-    }
     if !folder.is_dir() {
         let (path, folder) = (path.into(), folder.into());
         return Err(OutputError::NoFolder { path, folder });
     }
     Ok(())
+}
+
+/// An error where a result would take the place of what it is made of.
+pub fn check_not_input(path: &Path, inputs: &[&Path]) -> Result<(), OutputError> {
+    let there = |path: &Path| fs::canonicalize(path).ok();
+    match there(path)
+        .is_some_and(|out| inputs.iter().any(|input| there(input) == Some(out.clone())))
+    {
+        true => Err(OutputError::IsInput { path: path.into() }),
+        false => Ok(()),
+    }
 }
 
 /// A text on disk that has not got its name yet; dropping it removes it.

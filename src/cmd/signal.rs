@@ -17,7 +17,7 @@ use faer::MatRef;
 use serde_json::json;
 
 use self::tables::placed_frames;
-use super::output::{check_place, draft_json, say};
+use super::output::{check_not_input, check_place, draft_json, say};
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
@@ -41,7 +41,16 @@ const EXAMPLES: &str = "Examples:
   meshseq signal fit @roam-small:300 --tolerance 0.01 --window 120 --overlap 16 -o roam.npz
 
 --window fits as few windows as hold N frames each, one after another, and joins them smoothly: for
-sequences that are long, or larger than memory. `signal sample` and `signal info` read what it writes.";
+sequences that are long, or larger than memory. `signal sample` and `signal info` read what it writes.
+
+Printed: (3), (4), (7) and (2), the sums of squares of section 3 of the paper: of frames against h,
+of shape coordinates against g, of pose-space positions against f, and of frames against all three,
+in the units of the shape space; the root mean square distance of vertices over the first frame's
+diagonal; that of Karni & Gotsman 2004; and the in-betweens that leave the neighbourhood of their
+frames by more than a quarter of a step.
+
+The .npz holds h0 (d), H (m, d), sites (l, 2), g (l + 3, m), control (k, 2), u (k + 2), t (n), the
+frames' places p (n, 2), F (F, 3), meta, and, but for vertex space, reference (V, 3).";
 
 #[derive(Subcommand)]
 pub enum Signal {
@@ -98,7 +107,7 @@ pub struct FitVerb {
     #[arg(long, requires_all = ["k", "l"], allow_negative_numbers = true, value_parser = whole("0 to n - 1 for n frames"))]
     m: Option<usize>,
     /// Choose k, l, m for this relative RMS error, such as 0.01
-    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"], required_unless_present = "k")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["k", "l", "m"])]
     tolerance: Option<f64>,
     /// Shape space: vertex, gradient, lric, lengths or patch
     #[arg(long, default_value = "vertex", value_name = "SPACE")]
@@ -197,8 +206,10 @@ impl Fitted {
 impl FitVerb {
     pub fn run(self) -> Outcome {
         let how = self.how()?;
+        self.check_constants()?;
         if let Some(out) = &self.out {
             check_representation_place(out)?;
+            check_not_input(out, &[Path::new(&self.sequence)])?;
         }
         self.json.as_deref().map_or(Ok(()), check_place)?;
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
@@ -229,7 +240,36 @@ impl FitVerb {
             json.keep()?;
         }
         say(&describe(&self.sequence, &numbers));
+        if let Some(note) = self.cut(&numbers) {
+            say(&note);
+        }
         Ok(true)
+    }
+
+    /// An error unless something says how close the fit is to be, and nothing contradicts it.
+    fn check_constants(&self) -> Result<(), Failure> {
+        if self.k.is_none() && self.tolerance.is_none() {
+            return Err("expected --tolerance R, such as 0.01, or --k, --l and --m".into());
+        }
+        if self.refine && self.pins.is_some() {
+            return Err(
+                "--refine moves all frames in the pose plane, pinned ones too; leave out --pins or --refine".into(),
+            );
+        }
+        Ok(())
+    }
+
+    /// What became of k, l and m that the frames have no use for.
+    fn cut(&self, numbers: &serde_json::Value) -> Option<String> {
+        let asked = [("k", self.k?), ("l", self.l?), ("m", self.m?)];
+        let less = |(name, value): &(&str, usize)| numbers[*name] != *value;
+        let cut: Vec<String> = asked
+            .iter()
+            .filter(|constant| less(constant))
+            .map(|(name, value)| format!("{name} = {} in place of {value}", numbers[*name]))
+            .collect();
+        let why = "the frames have no more poses that are apart, or dimensions";
+        (!cut.is_empty()).then(|| format!("{}: {why}", cut.join(", ")))
     }
 
     fn how(&self) -> Result<How, Failure> {
@@ -431,7 +471,7 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          {}\n\
-         relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
+         relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers in h, g and f for {} given\n\
          ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
@@ -479,6 +519,9 @@ fn astray_line(places: &serde_json::Value) -> String {
 /// Rows `frame,x,y` below a header line, with frames of 1 to n.
 fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
     let pins = placed_frames(path, "pins")?;
+    if pins.is_empty() {
+        return Err(format!("{}: no pins below the first line", path.display()).into());
+    }
     validate_pins(&pins, n).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(pins)
 }

@@ -11,11 +11,14 @@ use super::insert::InsertError;
 use super::psi::TimeSignal;
 use super::sketch::{Sketch, SketchError};
 use super::strand::{Bead, Piece, Seam, Strand, join};
+use crate::linalg::kernels::max_abs;
 
 /// A span of frames with fewer control points of its own has no curve that could be taken along; it gets knots at its frames first.
 const FEWEST_BEADS: usize = 4;
 /// More frames or control points are a mistake.
 const MOST: usize = 10_000_000;
+/// Positions farther away than so many extents of the motion are a mistake.
+const FAR: f64 = 1e6;
 
 /// What to do with the time signal. Frames and control points are 0-based, ranges hold both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +89,14 @@ pub enum EditProblem {
     /// A position that is NaN or infinite.
     #[error("a position is not finite: {0:?}")]
     NotFinite(Point),
+    /// A position that no motion of this size has.
+    #[error(
+        "the position {point:?} is farther than {FAR:e} times the extent of the motion, {extent:.3e}; positions are in the units of the pose plane"
+    )]
+    TooFar { point: Point, extent: f64 },
+    /// A loop through nothing.
+    #[error("`through` is empty; expected at least 1 point [x, y]")]
+    NoPoint,
     /// A count of 0.
     #[error("`{0}` is 0; expected at least 1")]
     Zero(&'static str),
@@ -213,7 +224,7 @@ fn make(strand: Strand, edit: &Edit) -> Result<Strand, EditProblem> {
 }
 
 fn moved(mut strand: Strand, control: usize, target: Target) -> Result<Strand, EditProblem> {
-    let count = strand.spline.control.len();
+    let (count, extent) = (strand.spline.control.len(), extent(&strand));
     let Some(point) = strand.spline.control.get_mut(control) else {
         let control = control + 1;
         return Err(EditProblem::NoControlPoint { control, count });
@@ -222,14 +233,23 @@ fn moved(mut strand: Strand, control: usize, target: Target) -> Result<Strand, E
         Target::To(to) => to,
         Target::By(by) => [point[0] + by[0], point[1] + by[1]],
     };
-    finite(*point)?;
+    check_place(*point, extent)?;
     Ok(strand)
 }
 
-fn finite(p: Point) -> Result<(), EditProblem> {
-    match p.iter().all(|x| x.is_finite()) {
-        true => Ok(()),
-        false => Err(EditProblem::NotFinite(p)),
+/// The greatest coordinate of the control points.
+fn extent(strand: &Strand) -> f64 {
+    max_abs(strand.spline.control.as_flattened())
+}
+
+fn check_place(point: Point, extent: f64) -> Result<(), EditProblem> {
+    let most = max_abs(&point);
+    if !point.iter().all(|x| x.is_finite()) {
+        return Err(EditProblem::NotFinite(point));
+    }
+    match most > FAR * extent && extent > 0.0 {
+        true => Err(EditProblem::TooFar { point, extent }),
+        false => Ok(()),
     }
 }
 
@@ -346,7 +366,11 @@ fn looped(
         let (after, most) = (after.saturating_add(1), n.saturating_sub(1));
         return Err(EditProblem::LoopAtEnd { after, most });
     }
-    through.iter().try_for_each(|&p| finite(p))?;
+    if through.is_empty() {
+        return Err(EditProblem::NoPoint);
+    }
+    let extent = extent(&strand);
+    through.iter().try_for_each(|&p| check_place(p, extent))?;
     if frames == Some(0) {
         return Err(EditProblem::Zero("frames"));
     }

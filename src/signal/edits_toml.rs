@@ -87,7 +87,7 @@ fn once() -> usize {
 
 /// The edits of a text.
 pub fn parse(text: &str) -> Result<Vec<Edit>, EditsError> {
-    let wire: Wire = toml::from_str(text).map_err(|e| EditsError::Toml(one_line(&e)))?;
+    let wire: Wire = toml::from_str(text).map_err(|e| EditsError::Toml(one_line(&e, text)))?;
     let edits = wire.edit.into_iter().enumerate();
     edits
         .map(|(i, wire)| edit(wire).map_err(|what| EditsError::Edit { edit: i + 1, what }))
@@ -95,9 +95,14 @@ pub fn parse(text: &str) -> Result<Vec<Edit>, EditsError> {
 }
 
 /// The message without the picture of the text, which may be long, and its line.
-fn one_line(error: &toml::de::Error) -> String {
+fn one_line(error: &toml::de::Error, text: &str) -> String {
     let message: String = error.message().chars().take(200).collect();
-    message.replace('\n', " ")
+    let message = message.replace('\n', " ");
+    let start = error.span().map(|span| span.start);
+    match start.and_then(|at| text.get(..at)) {
+        Some(before) => format!("line {}: {message}", before.split('\n').count()),
+        None => message,
+    }
 }
 
 fn edit(wire: WireEdit) -> Result<Edit, String> {

@@ -15,7 +15,7 @@ use super::knots::{KnotError, KnotRule, knots};
 use super::layout::{Distances, Layout, LayoutError};
 use super::mds::Steps;
 use super::parameters::{Grid, centripetal, distinct};
-use super::pins::{Pin, PinError, validate_pins};
+use super::pins::{Pin, PinError, check_distance, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
 use super::sites::{SiteOrder, site_order};
@@ -259,7 +259,7 @@ impl Base {
         let (shape, h) = timed(|| shape_signal(frames, m));
         let shape = shape?;
         let error_h = error_h(frames, &shape);
-        Ok(Self::from_shape(shape, error_h, h, layout, pins)?)
+        Self::from_shape(shape, error_h, h, layout, pins)
     }
 
     /// From a shape signal already found, with its error (3).
@@ -269,8 +269,9 @@ impl Base {
         h: Duration,
         layout: Layout,
         pins: &[Pin],
-    ) -> Result<Self, FactorError> {
+    ) -> Result<Self, FitError> {
         let x = shape.coordinates.as_ref();
+        check_distance(pins, x)?;
         let (planes, mds) = timed(|| {
             let distances = Distances::new(x);
             let plane = |weight| -> Result<Plane, FactorError> {

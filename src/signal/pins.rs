@@ -24,6 +24,15 @@ pub enum PinError {
     /// A position that is NaN or infinite.
     #[error("pin of frame {frame} has a position that is not finite: {position:?}")]
     NotFinite { frame: usize, position: Point },
+    /// A position that no motion of this size has.
+    #[error(
+        "pin of frame {frame} at {position:?} is farther than {FAR:e} times the extent of the shape coordinates, {extent:.3e}, in whose units pins are"
+    )]
+    TooFar {
+        frame: usize,
+        position: Point,
+        extent: f64,
+    },
     /// One frame pinned to two places.
     #[error("frame {frame} is pinned twice, to {first:?} and to {second:?}; keep one of them")]
     Contradiction {
@@ -31,6 +40,24 @@ pub enum PinError {
         first: Point,
         second: Point,
     },
+}
+
+/// Pins farther away than so many extents of the shape coordinates are a mistake.
+const FAR: f64 = 1e6;
+
+/// An error where a pin is not among the shape coordinates (m x n). O(m n).
+pub(super) fn check_distance(pins: &[Pin], coordinates: MatRef<'_, f64>) -> Result<(), PinError> {
+    let columns = coordinates.col_iter();
+    let extent = columns.map(|x| x.norm_l2()).fold(0.0, f64::max);
+    let far = |pin: &&Pin| pin.position[0].hypot(pin.position[1]) > FAR * extent;
+    match pins.iter().find(far) {
+        Some(pin) if extent > 0.0 => Err(PinError::TooFar {
+            frame: pin.frame + 1,
+            position: pin.position,
+            extent,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Frames are named 1-based in errors, as the paper counts them. The same pin given twice is one pin. O(pins + frames).

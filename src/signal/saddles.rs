@@ -13,6 +13,8 @@ use crate::linalg::kernels::{axpy, dot};
 /// In-betweens farther than this share of a step from the cubic spline have left the neighbourhood of their neighbours. Half way along an arc of 60
 /// degrees a step the chord is off by 0.13 of a step, and motion sampled more coarsely than that tells little of its in-betweens.
 pub const ASTRAY: f64 = 0.25;
+/// Where a motion stands still or nearly so, this share of its mean step is what its in-betweens are measured by.
+const STILL: f64 = 0.1;
 /// Where the tangents of g are nearer than this to parallel (the square of a sine), the surface has no tangent plane to speak of.
 const PARALLEL: f64 = 1e-12;
 
@@ -24,7 +26,7 @@ pub struct Place {
     /// f(time).
     pub point: Point,
     /// Distance in shape coordinates of g(f(time)) from the cubic spline, less the greater of the errors of g(f(i)) and g(f(i + 1)), over the mean
-    /// length of the steps from i - 1 to i + 2. What a fit of few sites smooths away at the frames does not count; 0 is the least.
+    /// length of the steps from i - 1 to i + 2, or a tenth of all steps' mean where that is more. What a fit of few sites smooths away at the frames does not count; 0 is the least.
     pub stray: f64,
     /// Gaussian curvature of the surface g at f(time), times the square of that mean length, which leaves no unit: how much a patch the size of a
     /// step turns. None where g has no tangent plane, as on a collinear layout.
@@ -52,7 +54,7 @@ pub fn places(fit: &Fit) -> Vec<Place> {
         .windows(2)
         .map(|w| super::mds::separation(w[0], w[1]))
         .collect();
-    let longest = steps.iter().copied().fold(0.0, f64::max);
+    let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
     let witness = CubicSpline::new(x, Ends::Natural).midpoints();
     let mut value = vec![0.0; m];
     // Distance of g(f(time)) from this point.
@@ -69,8 +71,7 @@ pub fn places(fit: &Fit) -> Vec<Place> {
             let beside = &steps[i.saturating_sub(1)..(i + 2).min(steps.len())];
             let step = beside.iter().sum::<f64>() / beside.len() as f64;
             let beyond = away(time, witness.col_as_slice(i)) - errors[i].max(errors[i + 1]);
-            // A motion that stands still is measured by its longest step's rounding.
-            let scale = step.max(1e-9 * longest);
+            let scale = step.max(STILL * mean);
             Place {
                 time,
                 point,

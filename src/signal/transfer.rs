@@ -191,8 +191,7 @@ impl ExampleBasis {
             coordinates: self.coordinates(frames)?,
             singular_values: self.factors.s.clone(),
         };
-        let base = Base::from_shape(shape, 0.0, Default::default(), Layout::Mds, pins)
-            .map_err(FitError::from)?;
+        let base = Base::from_shape(shape, 0.0, Default::default(), Layout::Mds, pins)?;
         Ok(base.fit(k, l, knots)?)
     }
 }

@@ -51,6 +51,12 @@ fn constants_out_of_range_on_each_side() {
 }
 
 #[test]
+fn no_constants_at_all() {
+    let scratch = good();
+    fit(&scratch, &[], &["--tolerance R", "--k, --l and --m"]);
+}
+
+#[test]
 fn fewer_than_four_frames() {
     let scratch = Scratch::new();
     for n in 1..4 {

@@ -66,6 +66,32 @@ fn folders_that_do_not_exist_or_are_files() {
 }
 
 #[test]
+fn what_is_read_is_not_written_over() {
+    let scratch = good();
+    let [good, rep, edits] = ["good.npz", "rep.npz", "edits.toml"].map(|name| scratch.arg(name));
+    fs::write(&edits, "[[edit]]\ndo = \"reverse\"\nframes = \"1..3\"\n").unwrap();
+    let klm = ["--k", "6", "--l", "5", "--m", "3"];
+    for arguments in [
+        &["convert", &good, &good, "--frames", "1..2"][..],
+        &["signal", "sample", &rep, "-o", &rep],
+        &["signal", "edit", &rep, &edits, "-o", &rep],
+        &[&["signal", "fit", &good, "-o", &good], &klm[..]].concat(),
+    ] {
+        refused(scratch.path(), arguments, &["it is what is read"]);
+    }
+    let frames = scratch.arg("frames");
+    super::common::must(&["convert", &good, &frames]);
+    for arguments in [
+        &["convert", &good, &frames][..],
+        &["signal", "sample", &rep, "-o", &frames],
+    ] {
+        refused(scratch.path(), arguments, &["frames: ", "not empty"]);
+    }
+    let onto_itself = ["convert", &frames, &frames, "--every", "2"];
+    refused(scratch.path(), &onto_itself, &["it is what is read"]);
+}
+
+#[test]
 fn folders_in_the_place_of_files() {
     let scratch = good();
     for name in ["a.npz", "a.json"] {

@@ -50,6 +50,26 @@ fn pins_that_contradict_each_other_or_name_no_frame() {
 }
 
 #[test]
+fn pins_farther_than_any_pose() {
+    let scratch = good();
+    let [input, pins, out] = ["good.npz", "pins.csv", "out.npz"].map(|name| scratch.arg(name));
+    for far in ["1e9", "1e160", "-1e300"] {
+        fs::write(&pins, format!("frame,x,y\n1,{far},0\n3,0,0\n")).unwrap();
+        let fit = ["signal", "fit", &input, "--pins", &pins, "-o", &out];
+        let words = ["pin of frame 1", "farther", "shape coordinates"];
+        let klm = ["--k", "6", "--l", "5", "--m", "3"];
+        refused(scratch.path(), &[&fit[..], &klm].concat(), &words);
+        let tolerance = ["--tolerance", "0.01"];
+        refused(scratch.path(), &[&fit[..], &tolerance].concat(), &words);
+    }
+    fs::write(&pins, "frame,x,y\n1,0,0\n").unwrap();
+    let fit = ["signal", "fit", &input, "--pins", &pins, "-o", &out];
+    let refine = ["--tolerance", "0.01", "--refine"];
+    let words = ["--refine", "--pins", "leave out"];
+    refused(scratch.path(), &[&fit[..], &refine].concat(), &words);
+}
+
+#[test]
 fn files_that_hold_no_pins() {
     let scratch = good();
     for text in [

@@ -56,6 +56,17 @@ fn edits_that_cannot_be_made() {
         &["finite"],
     );
     edits(&scratch, &one("\"move\"\ncontrol = 1"), &["`to` or `by`"]);
+    for far in ["1e200", "1e308", "-1e100"] {
+        let words = ["edit 1", "farther", "pose plane"];
+        let to = format!("\"move\"\ncontrol = 2\nto = [{far}, 1]");
+        edits(&scratch, &one(&to), &words);
+        let through = format!("\"loop\"\nafter = 2\nthrough = [[{far}, 1]]");
+        edits(&scratch, &one(&through), &words);
+    }
+    let none = "\"loop\"\nafter = 2\nthrough = []";
+    edits(&scratch, &one(none), &["edit 1", "at least 1 point"]);
+    let negative = "\"delete\"\nframes = \"2..3\"\njoin = -1";
+    edits(&scratch, &one(negative), &["line", "-1"]);
     edits(
         &scratch,
         &one("\"delete\"\nframes = \"1..5\""),
@@ -85,11 +96,6 @@ fn edits_that_cannot_be_made() {
         &scratch,
         &one("\"loop\"\nafter = 6\nthrough = [[1.0, 1.0]]"),
         &["after frame 6", "1 to 5"],
-    );
-    edits(
-        &scratch,
-        &one("\"loop\"\nafter = 2\nthrough = []"),
-        &["at least 2 points"],
     );
     edits(
         &scratch,
@@ -192,6 +198,10 @@ fn examples_that_pair_nothing() {
         &["k = 99", "4 <= k <= 8"],
     );
     transfer("good.npz --examples good.npz", &["2 values"]);
+    for some in ["--frames 1..3", "--every 2"] {
+        let arguments = format!("rep.npz --examples good.npz good.npz {some}");
+        transfer(&arguments, &["rep.npz is transferred whole", "--frames"]);
+    }
     transfer("none.npz --examples good.npz good.npz", &["none.npz"]);
     write(&sheet(1, 3, 3), &scratch.at("rest.obj")).unwrap();
     transfer(

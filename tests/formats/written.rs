@@ -48,8 +48,16 @@ fn what_is_replaced_and_what_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("frames")).unwrap();
+    write(&counting(3), &at("frames")).unwrap();
+    // What lies in a folder is never lost.
+    let error = write(&counting(2), &at("frames")).unwrap_err();
+    assert!(
+        matches!(error, FormatError::WouldOverwrite { .. }),
+        "{error}"
+    );
+    assert_eq!(read(&at("frames")).unwrap().frame_count(), 3);
     for frames in [5, 3] {
-        for name in ["frames", "a.npz", "b.pc2"] {
+        for name in ["a.npz", "b.pc2"] {
             write(&counting(frames), &at(name)).unwrap();
             assert_eq!(read(&at(name)).unwrap().frame_count(), frames, "{name}");
         }

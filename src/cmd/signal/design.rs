@@ -27,6 +27,7 @@ pub struct DesignVerb {
     poses: PathBuf,
     /// CSV of points that the curve runs through, in order: x, y; with a header line
     curve: PathBuf,
+    #[arg(value_name = "SEQ")]
     /// Where the poses come from: a folder or pattern of OBJ frames, an .npz, a .pc2, or @name
     sequence: String,
     /// Frames of the new sequence, at equal ways along the curve
@@ -94,12 +95,13 @@ impl DesignVerb {
         };
         let numbers = self.outputs.write(&stored, &poses, numbers)?;
         say(&format!(
-            "{}: {} frames from {} poses in {} space; {} faces newly inside out",
+            "{}: {} frames from {} poses in {} space; {} faces newly inside out{}",
             self.outputs.out.display(),
             self.frames,
             places.len(),
             kind.name(),
             numbers["faces_turned"],
+            super::result::advice(&numbers, kind),
         ));
         Ok(true)
     }

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::super::Outcome;
-use super::super::output::{check_place, draft_json, say};
+use super::super::output::{check_not_input, check_place, draft_json, say};
 use super::tables::read_text;
 use crate::signal::edit::edit;
 use crate::signal::edits_toml::parse;
@@ -21,11 +21,14 @@ pub const EXAMPLES: &str = "Examples:
 An edit is a table [[edit]] with `do` and:
   do = \"move\"     control = 5, by = [0.2, -0.1] or to = [x, y] in pose space
   do = \"loop\"     after = 40, through = [[x, y], ..]; frames = 19, control = 15
-  do = \"delete\"   frames = \"3..5\"; join = 2 new frames across the seam
+  do = \"delete\"   frames = \"3..5\"; join = 2
   do = \"repeat\"   frames = \"1..12\"; times = 2, join = 3
   do = \"reverse\"  frames = \"1..12\"; join = 3
   do = \"refine\"   frames = \"3..5\": more control points there, the same curve
-Frames and control points count from 1; what stands after `;` may be left out.";
+Frames and control points count from 1. What stands after `;` may be left out: `frames` is then as
+many as keep the mean pace, `control` in proportion, `times` (in addition to the first) 1, `join`,
+the new frames at each seam, 0. `signal info --places` and `--json` show where frames and control
+points are.";
 
 #[derive(Args)]
 pub struct EditVerb {
@@ -44,6 +47,7 @@ pub struct EditVerb {
 impl EditVerb {
     pub fn run(self) -> Outcome {
         super::check_representation_place(&self.out)?;
+        check_not_input(&self.out, &[&self.representation, &self.edits])?;
         self.json.as_deref().map_or(Ok(()), check_place)?;
         let stored = load(&self.representation)?;
         let place = self.edits.display();
@@ -55,6 +59,7 @@ impl EditVerb {
         let kept = edited.kept.iter().filter(|&&kept| kept).count();
         let (new_k, new_n) = (edited.time.spline.control.len(), edited.sources.len());
         let sources: Vec<Option<usize>> = edited.sources.iter().map(|s| s.map(|i| i + 1)).collect();
+        let others = ranges(&edited.kept);
         let numbers = json!({
             "n_before": n, "k_before": k, "n": new_n, "k": new_k, "frames_kept": kept,
             "sources": sources, "kept": edited.kept,
@@ -74,9 +79,29 @@ impl EditVerb {
             json.keep()?;
         }
         say(&format!(
-            "{}: (k, n) = ({k}, {n}) before and ({new_k}, {new_n}) now, {kept} frames as they were, bit for bit",
-            self.out.display()
+            "{}: (k, n) = ({k}, {n}) before and ({new_k}, {new_n}) now, {kept} frames as they were, bit for bit{}",
+            self.out.display(),
+            match others.is_empty() {
+                true => String::new(),
+                false => format!("; new or changed: {others}"),
+            }
         ));
         Ok(true)
     }
+}
+
+/// The runs of frames that are not kept, from 1 on, such as `4..6, 9`.
+fn ranges(kept: &[bool]) -> String {
+    let mut frame = 1;
+    let mut runs = Vec::new();
+    for run in kept.chunk_by(|a, b| a == b) {
+        let last = frame + run.len() - 1;
+        match run {
+            [true, ..] => {}
+            [_] => runs.push(frame.to_string()),
+            _ => runs.push(format!("{frame}..{last}")),
+        }
+        frame = last + 1;
+    }
+    runs.join(", ")
 }

@@ -6,12 +6,14 @@ use clap::Args;
 use serde_json::json;
 
 use super::super::Outcome;
-use super::super::output::{check_place, draft_json, say};
+use super::super::output::{Draft, check_place, draft_json, say};
 use crate::signal::windows_file::WindowsFile;
 
 pub const EXAMPLES: &str = "Examples:
   meshseq signal fit @roam-small:200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
-  meshseq signal info roam.npz --json roam.json";
+  meshseq signal info roam.npz --json roam.json
+  meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
+  meshseq signal info gallop.npz --places gallop.csv";
 
 #[derive(Args)]
 pub struct InfoVerb {
@@ -20,24 +22,37 @@ pub struct InfoVerb {
     /// Write the numbers to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write where the frames are in the pose plane to this CSV, in the form of `signal fit --pins`
+    #[arg(long, value_name = "FILE")]
+    places: Option<PathBuf>,
 }
 
 impl InfoVerb {
     pub fn run(self) -> Outcome {
-        self.json.as_deref().map_or(Ok(()), check_place)?;
+        for path in self.json.iter().chain(&self.places) {
+            check_place(path)?;
+        }
         let mut file = WindowsFile::open(&self.representation)?;
         let (plan, mesh) = (file.plan().clone(), file.connectivity().clone());
         let mut lines = Vec::new();
         let mut windows = Vec::new();
         let mut stored_numbers = 0;
+        let mut table = String::from("frame,x,y\n");
         for (j, range) in plan.windows().iter().enumerate() {
-            let representation = &file.window(j)?.representation;
+            let window = file.window(j)?;
+            let representation = &window.representation;
             let (first, last) = (range.start + 1, range.end);
             let (k, l, m) = representation.klm();
             let stored = representation.stored_numbers();
             stored_numbers += stored;
+            for (frame, [x, y]) in (first..).zip(&window.positions) {
+                table.push_str(&format!("{frame},{x},{y}\n"));
+            }
             windows.push(json!({
                 "first": first, "last": last, "k": k, "l": l, "m": m, "stored_numbers": stored,
+                "places": window.positions, "sites": representation.pose.sites,
+                "control": representation.time.spline.control, "knots": representation.time.spline.knots,
+                "parameters": representation.time.parameters,
             }));
             lines.push(format!(
                 "frames {first} to {last}: k = {k}, l = {l}, m = {m}, {stored} numbers"
@@ -48,16 +63,23 @@ impl InfoVerb {
             "n": n, "V": vertices, "F": faces, "space": file.space().name(),
             "overlap": plan.overlap(), "windows": windows, "stored_numbers": stored_numbers,
         });
+        let places = self.places.as_ref().map(|path| Draft::new(path, &table));
+        let places = places.transpose()?;
         if let Some(path) = &self.json {
             draft_json(path, &numbers)?.keep()?;
         }
+        if let Some(places) = places {
+            places.keep()?;
+        }
         say(&format!(
-            "{}: {} space, n = {n}, V = {vertices}, F = {faces}, {stored_numbers} numbers stored for {} given, {} windows with {} frames in common",
+            "{}: {} space, n = {n}, V = {vertices}, F = {faces}, {stored_numbers} numbers in h, g and f for {} given{}",
             self.representation.display(),
             file.space().name(),
             3 * n * vertices,
-            plan.windows().len(),
-            plan.overlap(),
+            match plan.windows().len() {
+                1 => String::new(),
+                count => format!(", {count} windows with {} frames in common", plan.overlap()),
+            }
         ));
         lines.iter().for_each(|line| say(line));
         Ok(true)

@@ -6,15 +6,16 @@ use clap::Args;
 use serde_json::Value;
 
 use super::super::Failure;
-use super::super::output::{check_place, draft_json};
+use super::super::output::{check_parent, check_place, draft_json};
 use super::sample::frames_at;
 use crate::mesh::orientation::Orientation;
 use crate::sequence::format::write;
+use crate::shape::SpaceKind;
 use crate::signal::file::{Stored, save};
 
 #[derive(Args)]
 pub struct Outputs {
-    /// Frames go here: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    /// Frames go here: .npz, .pc2 (with an .obj beside it), or a new folder of OBJ frames
     #[arg(short, long, value_name = "OUT")]
     pub out: PathBuf,
     /// Write the representation to this .npz, for `signal sample` and `signal edit`
@@ -25,9 +26,18 @@ pub struct Outputs {
     json: Option<PathBuf>,
 }
 
+/// What helps where faces are inside out.
+pub fn advice(numbers: &Value, kind: SpaceKind) -> &'static str {
+    match numbers["faces_turned"] == 0 || kind != SpaceKind::Vertex {
+        true => "",
+        false => "; --space gradient turns fewer",
+    }
+}
+
 impl Outputs {
     /// Refuses places that nothing could be written to; to be asked before long work.
     pub fn check(&self) -> Result<(), Failure> {
+        check_parent(&self.out)?;
         if let Some(rep) = &self.rep {
             super::check_representation_place(rep)?;
             if rep == &self.out {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::super::output::{check_place, draft_json, say};
+use super::super::output::{check_not_input, check_place, draft_json, say};
 use super::super::{Failure, Outcome, whole};
 use super::tables::{numbers, pairs, read_text};
 use crate::sequence::Sequence;
@@ -29,7 +29,7 @@ pub struct SampleVerb {
     /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
     #[arg(long, alias = "count", value_name = "N", allow_negative_numbers = true, value_parser = whole("1 or more"))]
     frames: Option<usize>,
-    /// Frames in place of one: 1.5 for three in place of two
+    /// Frames in place of one: 1.5 for three in place of two, from frame 1 on at a step of 1/R, which may end before frame n
     #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with_all = ["frames", "times", "warp"])]
     rate: Option<f64>,
     /// Frame times in [1, n] in any order: numbers separated by commas, or a file of them
@@ -43,7 +43,7 @@ pub struct SampleVerb {
     /// CSV of slow and fast motion: frame (of the new sequence), time (of the old); with a header line
     #[arg(long, value_name = "FILE", conflicts_with = "frames")]
     warp: Option<PathBuf>,
-    /// Where to: .npz, .pc2 (with an .obj beside it), or a folder of OBJ frames
+    /// Where to: .npz, .pc2 (with an .obj beside it), or a new folder of OBJ frames
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// Write the numbers to this file
@@ -54,6 +54,7 @@ pub struct SampleVerb {
 impl SampleVerb {
     pub fn run(self) -> Outcome {
         self.json.as_deref().map_or(Ok(()), check_place)?;
+        check_not_input(&self.out, &[&self.representation])?;
         let mut file = WindowsFile::open(&self.representation)?;
         let n = file.plan().frame_count();
         let times = self.times(n)?;

@@ -27,7 +27,9 @@ pub const EXAMPLES: &str = "Examples:
   meshseq signal transfer @gallop-small --examples @gallop-small @gallop-small \\
     --example-frames 1..8 --space gradient -o galloping.npz --json transfer.json
 
-Examples pair frame by frame; the first shows both meshes in a reference pose.";
+Examples pair frame by frame; the first shows both meshes in a reference pose. What they miss is the
+share of the motion's spread about its mean that no mixture of them shows: near 0% the transfer
+is faithful, and where it is large more examples help, from other moments of the motion.";
 
 #[derive(Args)]
 pub struct TransferVerb {
@@ -138,7 +140,7 @@ impl TransferVerb {
             .outputs
             .write(&stored, b.sequence.positions(), numbers)?;
         say(&format!(
-            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces newly inside out",
+            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces newly inside out{}",
             self.outputs.out.display(),
             numbers["n"],
             numbers["V"],
@@ -146,6 +148,7 @@ impl TransferVerb {
             stored.representation.basis.ncols() + 1,
             100.0 * motion.missed,
             numbers["faces_turned"],
+            super::result::advice(&numbers, kind),
         ));
         Ok(true)
     }
@@ -165,6 +168,11 @@ impl TransferVerb {
             .into()),
             (Some(_), _) if self.k.or(self.l).is_some() => Err(format!(
                 "--k and --l: the signals of {} stay as they are; constants are for sequences",
+                self.source
+            )
+            .into()),
+            (Some(_), _) if !self.frames.is_all() => Err(format!(
+                "--frames and --every: {} is transferred whole; edit or sample it first, or give a sequence",
                 self.source
             )
             .into()),

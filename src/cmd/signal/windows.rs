@@ -129,7 +129,7 @@ fn describe(name: &str, v: &Value) -> String {
         .map(|w| w["astray"].as_array().map_or(0, Vec::len));
     let mut text = format!(
         "{name}: {} space, n = {} in {} windows with {} frames in common, {} knots, {} layout\n\
-         joined: squared distances of vertices {:.5}, relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers stored for {} given\n\
+         joined: squared distances of vertices {:.5}, relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers in h, g and f for {} given\n\
          in-betweens astray: {}; {:.0} ms",
         v["space"].as_str().unwrap_or(""),
         v["n"],

@@ -5,7 +5,6 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::FormatError;
-use super::files;
 
 /// How many bytes a regular file holds; anything else is refused.
 pub(super) fn size(path: &Path) -> Result<u64, FormatError> {
@@ -124,7 +123,7 @@ pub(super) struct FolderDraft {
 }
 
 impl FolderDraft {
-    /// An empty one. A folder that is at `path` already will be replaced, but only when all it holds are OBJ files.
+    /// An empty one. A folder that is at `path` already will be replaced, but only when it is empty.
     pub(super) fn create(path: &Path) -> Result<Self, FormatError> {
         let failed = |e| FormatError::writing(path, e);
         let there = path.exists();
@@ -134,7 +133,7 @@ impl FolderDraft {
             false => path.to_path_buf(),
         };
         if there {
-            refuse_foreign_folder(&target)?;
+            refuse_full_folder(&target)?;
         }
         let parent = parent_of(&target)?;
         let folder = temporary(0o777).tempdir_in(&parent).map_err(failed)?;
@@ -156,28 +155,17 @@ impl FolderDraft {
         self.folder.path()
     }
 
-    /// Moves the draft to its destination, replacing the folder that was there.
+    /// Moves the draft to its destination, in place of an empty folder if there is one.
     pub(super) fn keep(self) -> Result<(), FormatError> {
         let failed = |e| FormatError::writing(&self.path, e);
         if self.target.exists() {
-            refuse_foreign_folder(&self.target)?;
-            swap_in(self.folder.path(), &self.target, &self.parent).map_err(failed)?;
-        } else {
-            fs::rename(self.folder.path(), &self.target).map_err(failed)?;
+            refuse_full_folder(&self.target)?;
+            fs::remove_dir(&self.target).map_err(failed)?;
         }
+        fs::rename(self.folder.path(), &self.target).map_err(failed)?;
         let _ = self.folder.keep();
         Ok(())
     }
-}
-
-/// Puts `draft` in the place of `target`, whose contents are deleted once that is done; on failure they are put back.
-fn swap_in(draft: &Path, target: &Path, parent: &Path) -> io::Result<()> {
-    let old = temporary(0o777).tempdir_in(parent)?;
-    fs::rename(target, old.path())?;
-    fs::rename(draft, target).inspect_err(|_| {
-        let aside = old.keep();
-        let _ = fs::rename(aside, target);
-    })
 }
 
 /// The folder that holds `path`, which must exist.
@@ -196,7 +184,7 @@ fn parent_of(path: &Path) -> Result<PathBuf, FormatError> {
     }
 }
 
-fn refuse_foreign_folder(path: &Path) -> Result<(), FormatError> {
+fn refuse_full_folder(path: &Path) -> Result<(), FormatError> {
     let refuse = |reason: String| FormatError::WouldOverwrite {
         path: path.to_path_buf(),
         reason,
@@ -204,15 +192,11 @@ fn refuse_foreign_folder(path: &Path) -> Result<(), FormatError> {
     if !path.is_dir() {
         return Err(refuse("it is a file, not a folder".into()));
     }
-    for entry in fs::read_dir(path).map_err(|e| FormatError::writing(path, e))? {
-        let entry = entry.map_err(|e| FormatError::writing(path, e))?;
-        if !files::is_frame(&entry) {
-            let name = entry.file_name();
-            let reason = format!("it holds {}, which is not an OBJ frame", name.display());
-            return Err(refuse(reason));
-        }
+    let mut entries = fs::read_dir(path).map_err(|e| FormatError::writing(path, e))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(refuse("it is not empty".into())),
     }
-    Ok(())
 }
 
 /// Temporary names that are hidden, and permissions as for any new file (the umask applies).

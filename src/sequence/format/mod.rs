@@ -74,10 +74,10 @@ pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
 /// - `.npz`: arrays `V` (n, V, 3) of f64 and `F` (F, 3) of int64, 0-based;
 /// - `.pc2`: with the first frame and the faces beside it in the `.obj` of the same stem;
 /// - `.obj`: one file, for a sequence of one frame;
-/// - otherwise a folder of `0001.obj`, `0002.obj`, ... which may exist when all it holds are OBJ files: it is replaced.
+/// - otherwise a folder of `0001.obj`, `0002.obj`, ... which may exist when it is empty.
 ///
 /// Everything is written under a temporary name in the same folder and then renamed, so that a full disk or a missing
-/// permission leaves what was there before. Existing files of these formats are replaced. The same sequence always
+/// permission leaves what was there before. An existing file is replaced. The same sequence always
 /// gives the same bytes.
 pub fn write(sequence: &Sequence, path: &Path) -> Result<(), FormatError> {
     let frames = sequence.frame_count();

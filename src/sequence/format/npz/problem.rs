@@ -58,7 +58,7 @@ pub enum NpzProblem {
         found: u32,
     },
     /// An array that is needed and not there.
-    #[error("no array {array}; the file holds {}", .found.join(", "))]
+    #[error("no array {array}; the file holds {}{}", .found.join(", "), hint(.found))]
     Missing { array: String, found: Vec<String> },
     /// An array of another kind than needed.
     #[error("array {array}: expected {expected}, found {found}")]
@@ -81,4 +81,13 @@ pub enum NpzProblem {
     /// Something that cannot be written so that it reads back the same.
     #[error("array {array}: cannot be written: {reason}")]
     CannotWrite { array: String, reason: String },
+}
+
+/// What a file may be that is no sequence.
+fn hint(found: &[String]) -> &'static str {
+    let holds = |name: &str| found.iter().any(|found| found == name);
+    match holds("h0") || holds("windows") {
+        true => "; it is a representation, of which `meshseq signal sample` makes frames",
+        false => "",
+    }
 }
