@@ -18,6 +18,8 @@ use crate::shape::{ShapeError, Space, decode_all, encode_all};
 const ATTEMPTS: usize = 12;
 /// Each aims at this share of the error that the one before would need.
 const AIM: f64 = 0.8;
+/// A fit that uses this share of the tolerance is close enough to it.
+const CLOSE: f64 = 0.8;
 
 /// A fit in a shape space: errors (2) to (7) are in the units of S, squared.
 #[derive(Clone, Debug)]
@@ -66,7 +68,8 @@ pub fn refine_in_space(
 /// Chooses k, l and m (section 3.4) so that the vertices are off by at most `rms` after decoding.
 ///
 /// The allowed error (2) in S starts at the share of the frames' spread in S that `rms` is of their spread in space, and is then moved by what the
-/// decoded vertices show. The interpolating representation is the last resort.
+/// decoded vertices show, until at least four fifths of `rms` are used. Of the fits that meet it the one of fewest numbers is kept; the interpolating
+/// representation is the last resort.
 pub fn fit_in_space_to_rms(
     space: &dyn Space,
     frames: &[f64],
@@ -131,13 +134,38 @@ fn to_rms<T>(
     let given = MatRef::from_column_major_slice(frames, space.frame_len(), z.ncols());
     let allowed = rms * rms * frames.len() as f64 / 3.0;
     let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
+    let mut best: Option<(SpaceFit, T)> = None;
+    // The greatest error in S that met the tolerance, and the least that did not.
+    let (mut met, mut missed) = (0.0, f64::INFINITY);
     for _ in 0..ATTEMPTS {
         let (fit, told) = to_error(z.as_ref(), most.max(f64::MIN_POSITIVE))?;
         let found = rms_after_decoding(space, frames, &fit.representation)?;
-        if found <= rms {
-            return Ok((SpaceFit { fit, rms: found }, told));
+        let estimate = AIM * most * (rms / found.max(f64::MIN_POSITIVE)).powi(2);
+        if found > rms {
+            missed = most;
+        } else {
+            met = most;
+            let numbers = |fit: &Fit| fit.representation.stored_numbers();
+            if best
+                .as_ref()
+                .is_none_or(|(b, _)| numbers(&fit) < numbers(&b.fit))
+            {
+                best = Some((SpaceFit { fit, rms: found }, told));
+            }
+            if found >= CLOSE * rms {
+                break;
+            }
         }
-        most *= AIM * (rms / found).powi(2);
+        most = match estimate > met && estimate < missed {
+            true => estimate,
+            false => (met * missed).sqrt(),
+        };
+        if !most.is_finite() || missed <= met / CLOSE {
+            break;
+        }
+    }
+    if let Some(best) = best {
+        return Ok(best);
     }
     let (fit, told) = last_resort(z.as_ref())?;
     let rms = rms_after_decoding(space, frames, &fit.representation)?;

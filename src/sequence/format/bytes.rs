@@ -119,7 +119,6 @@ pub(super) struct FolderDraft {
     path: PathBuf,
     /// The destination itself, where `path` is a link or a path such as `.`.
     target: PathBuf,
-    parent: PathBuf,
 }
 
 impl FolderDraft {
@@ -141,7 +140,6 @@ impl FolderDraft {
             folder,
             path: path.to_path_buf(),
             target,
-            parent,
         })
     }
 
