@@ -763,7 +763,7 @@ mod tests {
                     frames: None,
                     control: None,
                 },
-                "at least 2 points",
+                "at least 1 point",
             ),
             (
                 Edit::Loop {

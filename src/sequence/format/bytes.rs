@@ -307,9 +307,14 @@ mod tests {
             drop(draft);
             assert_eq!(entries(folder.path()).len(), before);
             fs::create_dir_all(&path).unwrap();
-            fs::write(path.join("7.obj"), "v 1 1 1").unwrap();
         }
+        assert!(entries(&path).is_empty());
+        // What comes to lie there meanwhile is not lost.
+        let draft = FolderDraft::create(&path).unwrap();
+        fs::write(path.join("7.obj"), "v 1 1 1").unwrap();
+        assert!(draft.keep().is_err());
         assert_eq!(entries(&path), ["7.obj"]);
+        assert_eq!(entries(folder.path()), ["frames"]);
     }
 
     #[test]
