@@ -33,6 +33,8 @@ mod timing;
 mod verdicts;
 
 pub use html::html;
+pub use plots::PlotError;
+pub use plots::time_signal::{PosePlane, pose_plane};
 pub use published::{PublishedError, PublishedRow, TABLE_1};
 pub use readme::{SpliceError, readme_picture, readme_table, splice};
 pub use table1::table_1_text;

@@ -158,7 +158,7 @@ fn pictures_are_drawn_or_say_why_not() {
     assert_eq!(whole.matches("<figcaption>").count(), 2 * 4 + 6);
     assert!(whole.contains("1 of the singular values (zero, negative"));
     let broken = page(&broken());
-    assert!(broken.contains("Not drawn: the record has no points of a time signal."));
+    assert!(broken.contains("Not drawn: there are no points of a time signal."));
     assert!(broken.contains("are not finite numbers that can be drawn, and are left out."));
 }
 

@@ -198,6 +198,10 @@ fn examples_that_pair_nothing() {
         &["k = 99", "4 <= k <= 8"],
     );
     transfer("good.npz --examples good.npz", &["2 values"]);
+    for onto in ["rep.npz", "good.npz"] {
+        let arguments = format!("transfer rep.npz --examples good.npz good.npz -o {onto}");
+        bad(&scratch, &arguments, &["it is what is read"]);
+    }
     for some in ["--frames 1..3", "--every 2"] {
         let arguments = format!("rep.npz --examples good.npz good.npz {some}");
         transfer(&arguments, &["rep.npz is transferred whole", "--frames"]);

@@ -1,6 +1,6 @@
 //! `signal design` (section 4.4).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -52,7 +52,8 @@ pub struct DesignVerb {
 impl DesignVerb {
     pub fn run(self) -> Outcome {
         let kind: SpaceKind = self.space.parse()?;
-        self.outputs.check()?;
+        let inputs: [&Path; 3] = [&self.poses, &self.curve, Path::new(&self.sequence)];
+        self.outputs.check(&inputs)?;
         let sequence = open(&self.sequence)?;
         let placed = placed_frames(&self.poses, "poses")?;
         validate_pins(&placed, sequence.frame_count())

@@ -7,13 +7,18 @@ use serde_json::json;
 
 use super::super::Outcome;
 use super::super::output::{Draft, check_place, draft_json, say};
+use crate::report::{PlotError, PosePlane, pose_plane};
+use crate::signal::file::Stored;
 use crate::signal::windows_file::WindowsFile;
 
 pub const EXAMPLES: &str = "Examples:
   meshseq signal fit @roam-small:200 --k 60 --l 50 --m 20 --window 80 -o roam.npz
   meshseq signal info roam.npz --json roam.json
   meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
-  meshseq signal info gallop.npz --places gallop.csv";
+  meshseq signal info gallop.npz --places gallop.csv --plot gallop.svg";
+
+/// Points of f drawn between two frames.
+const PER_FRAME: usize = 12;
 
 #[derive(Args)]
 pub struct InfoVerb {
@@ -25,15 +30,26 @@ pub struct InfoVerb {
     /// Write where the frames are in the pose plane to this CSV, in the form of `signal fit --pins`
     #[arg(long, value_name = "FILE")]
     places: Option<PathBuf>,
+    /// Draw the time signal over the pose plane into this SVG, of a representation without windows
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 impl InfoVerb {
     pub fn run(self) -> Outcome {
-        for path in self.json.iter().chain(&self.places) {
+        for path in self.json.iter().chain(&self.places).chain(&self.plot) {
             check_place(path)?;
         }
         let mut file = WindowsFile::open(&self.representation)?;
         let (plan, mesh) = (file.plan().clone(), file.connectivity().clone());
+        let count = plan.windows().len();
+        if self.plot.is_some() && count > 1 {
+            return Err(format!(
+                "--plot: {} is in {count} windows, each with a pose plane of its own; fit it without --window",
+                self.representation.display()
+            )
+            .into());
+        }
         let mut lines = Vec::new();
         let mut windows = Vec::new();
         let mut stored_numbers = 0;
@@ -63,25 +79,53 @@ impl InfoVerb {
             "n": n, "V": vertices, "F": faces, "space": file.space().name(),
             "overlap": plan.overlap(), "windows": windows, "stored_numbers": stored_numbers,
         });
-        let places = self.places.as_ref().map(|path| Draft::new(path, &table));
-        let places = places.transpose()?;
+        let mut drafts = Vec::new();
+        if let Some(path) = &self.places {
+            drafts.push(Draft::new(path, &table)?);
+        }
+        if let Some(path) = &self.plot {
+            let svg = plot(&self.representation.display().to_string(), file.window(0)?)?;
+            drafts.push(Draft::new(path, &svg)?);
+        }
         if let Some(path) = &self.json {
             draft_json(path, &numbers)?.keep()?;
         }
-        if let Some(places) = places {
-            places.keep()?;
+        for draft in drafts {
+            draft.keep()?;
         }
         say(&format!(
             "{}: {} space, n = {n}, V = {vertices}, F = {faces}, {stored_numbers} numbers in h, g and f for {} given{}",
             self.representation.display(),
             file.space().name(),
             3 * n * vertices,
-            match plan.windows().len() {
+            match count {
                 1 => String::new(),
-                count => format!(", {count} windows with {} frames in common", plan.overlap()),
+                _ => format!(", {count} windows with {} frames in common", plan.overlap()),
             }
         ));
         lines.iter().for_each(|line| say(line));
         Ok(true)
     }
+}
+
+/// The time signal over the pose plane, as SVG. Sites that are no frames, as those of a refined fit, are not marked.
+fn plot(name: &str, stored: &Stored) -> Result<String, PlotError> {
+    let (time, sites) = (
+        &stored.representation.time,
+        &stored.representation.pose.sites,
+    );
+    let n = time.frame_count();
+    let dense = (0..=n.saturating_sub(1) * PER_FRAME).map(|i| 1.0 + i as f64 / PER_FRAME as f64);
+    let curve: Vec<_> = dense.map(|t| time.evaluate(t)).collect();
+    let frame_points: Vec<_> = (1..=n).map(|i| time.evaluate(i as f64)).collect();
+    let is_site = |&i: &usize| sites.contains(&stored.positions[i]);
+    let sites: Vec<usize> = (0..stored.positions.len()).filter(is_site).collect();
+    pose_plane(&PosePlane {
+        name,
+        positions: &stored.positions,
+        frame_points: &frame_points,
+        curve: &curve,
+        control: &time.spline.control,
+        sites: &sites,
+    })
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::super::Failure;
-use super::super::output::{check_parent, check_place, draft_json};
+use super::super::output::{check_not_input, check_parent, check_place, draft_json};
 use super::sample::frames_at;
 use crate::mesh::orientation::Orientation;
 use crate::sequence::format::write;
@@ -35,9 +35,12 @@ pub fn advice(numbers: &Value, kind: SpaceKind) -> &'static str {
 }
 
 impl Outputs {
-    /// Refuses places that nothing could be written to; to be asked before long work.
-    pub fn check(&self) -> Result<(), Failure> {
+    /// Refuses places that nothing could be written to, and those of the verb's inputs; to be asked before long work.
+    pub fn check(&self, inputs: &[&Path]) -> Result<(), Failure> {
         check_parent(&self.out)?;
+        for out in self.rep.iter().chain([&self.out]) {
+            check_not_input(out, inputs)?;
+        }
         if let Some(rep) = &self.rep {
             super::check_representation_place(rep)?;
             if rep == &self.out {

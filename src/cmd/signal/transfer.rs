@@ -91,7 +91,10 @@ impl TransferVerb {
             .parse()
             .map_err(|e| format!("{e}, found `{}`", self.knots))?;
         let asked: Option<SpaceKind> = self.space.as_deref().map(str::parse).transpose()?;
-        self.outputs.check()?;
+        let rest = self.rest.iter().flatten();
+        let inputs = [&self.source].into_iter().chain(&self.examples).chain(rest);
+        let inputs: Vec<&Path> = inputs.map(Path::new).collect();
+        self.outputs.check(&inputs)?;
         let path = Path::new(&self.source);
         let stored = is_representation(path).then(|| load(path)).transpose()?;
         let kind = self.space_of(stored.as_ref(), asked)?;

@@ -18,9 +18,9 @@ use thiserror::Error;
 
 /// Why there is no picture.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub(super) enum PlotError {
+pub enum PlotError {
     /// No number that could be drawn.
-    #[error("the record has {0}")]
+    #[error("there are {0}")]
     NothingToDraw(&'static str),
     /// The drawing library gave up.
     #[error("the drawing library failed: {0}")]

@@ -22,17 +22,53 @@ const NUMBERED: usize = 16;
 /// How far beyond the box of the positions the picture reaches at most, as a share of the box's longer side.
 const BEYOND: f64 = 0.6;
 
-/// The curve f with f(i) at the frames, the positions p_i, the sites and the control polygon.
+/// A time signal over the pose plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PosePlane<'a> {
+    /// What is shown, for who cannot see it.
+    pub name: &'a str,
+    /// p_1 .. p_n.
+    pub positions: &'a [[f64; 2]],
+    /// f(i) at the frames.
+    pub frame_points: &'a [[f64; 2]],
+    /// f densely sampled.
+    pub curve: &'a [[f64; 2]],
+    /// Control points of f.
+    pub control: &'a [[f64; 2]],
+    /// Frames (0-based) that are sites of g.
+    pub sites: &'a [usize],
+}
+
+impl<'a> From<&'a FitFigures> for PosePlane<'a> {
+    fn from(figures: &'a FitFigures) -> Self {
+        Self {
+            name: &figures.case,
+            positions: &figures.positions,
+            frame_points: &figures.frame_points,
+            curve: &figures.curve,
+            control: &figures.control,
+            sites: &figures.sites,
+        }
+    }
+}
+
+/// The curve f with f(i) at the frames, the positions p_i, the sites and the control polygon, as a whole `<svg>`.
+pub fn pose_plane(plane: &PosePlane) -> Result<String, PlotError> {
+    draw(plane, &Shown::new(plane))
+}
+
+/// The same of a fit on record.
 pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
+    let figures = &PosePlane::from(figures);
     let shown = Shown::new(figures);
     let all = shown.all();
     let total: usize = all.iter().map(|p| p.len()).sum();
     let kept: usize = all.iter().flat_map(|p| p.iter().flatten()).count();
     let given = [
-        &figures.curve,
-        &figures.frame_points,
-        &figures.positions,
-        &figures.control,
+        figures.curve,
+        figures.frame_points,
+        figures.positions,
+        figures.control,
     ];
     let not_numbers = total - given.iter().map(|p| finite(p).count()).sum::<usize>();
     let beyond = total - kept - not_numbers;
@@ -69,8 +105,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(figures: &FitFigures) -> Self {
-        let sets = [&figures.positions, &figures.frame_points, &figures.curve];
+    fn new(figures: &PosePlane) -> Self {
+        let sets = [figures.positions, figures.frame_points, figures.curve];
         let base = sets.iter().find(|p| finite(p).next().is_some());
         let limits = base.map(|points| limits(points));
         let within = |p: [f64; 2]| {
@@ -80,10 +116,10 @@ impl Shown {
         };
         let shown = |points: &[[f64; 2]]| points.iter().map(|&p| within(p)).collect();
         Self {
-            curve: shown(&figures.curve),
-            frames: shown(&figures.frame_points),
-            positions: shown(&figures.positions),
-            control: shown(&figures.control),
+            curve: shown(figures.curve),
+            frames: shown(figures.frame_points),
+            positions: shown(figures.positions),
+            control: shown(figures.control),
         }
     }
 
@@ -119,7 +155,7 @@ fn runs(canvas: &Canvas, points: &[Option<[f64; 2]>]) -> Vec<Vec<Place>> {
         .collect()
 }
 
-fn draw(figures: &FitFigures, shown: &Shown) -> Result<String, PlotError> {
+fn draw(figures: &PosePlane, shown: &Shown) -> Result<String, PlotError> {
     if shown
         .curve
         .iter()
@@ -133,7 +169,7 @@ fn draw(figures: &FitFigures, shown: &Shown) -> Result<String, PlotError> {
     let (x, y, height) = equal_axes(shown);
     let label = format!(
         "Time signal of {}: a curve over the pose plane through {} frames, with {} sites",
-        figures.case,
+        figures.name,
         figures.frame_points.len(),
         figures.sites.len()
     );
@@ -156,7 +192,7 @@ fn draw(figures: &FitFigures, shown: &Shown) -> Result<String, PlotError> {
     chart(&frame, |canvas| {
         polygon(canvas, &shown.control)?;
         let on_curve = curve(canvas, &shown.curve)?;
-        positions(canvas, shown, &figures.sites)?;
+        positions(canvas, shown, figures.sites)?;
         frames(canvas, &shown.frames, &on_curve)
     })
 }
