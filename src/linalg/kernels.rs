@@ -26,6 +26,40 @@ macro_rules! vectorised {
 }
 pub(crate) use vectorised;
 
+/// [`vectorised`], and compiled for AVX-512 as well: for loops that keep eight lanes busy throughout, which others do not gain from.
+macro_rules! vectorised_wider {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$doc])*
+        #[inline]
+        $vis fn $name($($arg: $type),*) $(-> $out)? {
+            #[inline(always)]
+            fn whole($($arg: $type),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+                fn wider($($arg: $type),*) $(-> $out)? { whole($($arg),*) }
+                if $crate::linalg::kernels::has_avx512() {
+                    // SAFETY: the processor has just been seen to have these instructions.
+                    return unsafe { wider($($arg),*) };
+                }
+            }
+            $crate::linalg::kernels::vectorised! {
+                fn narrower($($arg: $type),*) $(-> $out)? { whole($($arg),*) }
+            }
+            narrower($($arg),*)
+        }
+    };
+}
+pub(crate) use vectorised_wider;
+
+/// Whether the processor has the instructions of [`vectorised_wider`].
+#[cfg(target_arch = "x86_64")]
+#[inline]
+pub fn has_avx512() -> bool {
+    use std::arch::is_x86_feature_detected as has;
+    has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl")
+}
+
 /// Marks the upper halves of the vector registers as unused. faer's AVX-512 matrix product (private-gemm-x86 0.1.22) returns without doing so, and every
 /// instruction of the baseline set is then several times slower, until something else does: call this after faer.
 #[inline]

@@ -2,7 +2,7 @@
 
 use faer::MatRef;
 
-use super::kernels::{LANES, vectorised};
+use super::kernels::{LANES, vectorised_wider};
 
 /// Eight rows after eight rows, each by columns, the last padded with zeros: what four vectors at a time need of it goes through registers once.
 pub struct Panels {
@@ -45,7 +45,7 @@ impl Panels {
     }
 }
 
-vectorised! {
+vectorised_wider! {
     fn combine_panel(a: [&[f64]; 4], columns: &[[f64; LANES]], sums: &mut [[f64; LANES]; 4]) {
         let (fours, rest) = columns.as_chunks::<4>();
         let [a0, a1, a2, a3] = a.map(|a| &a.as_chunks::<4>().0[..fours.len()]);

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::Point;
-use crate::linalg::kernels::vectorised;
+use crate::linalg::kernels::vectorised_wider;
 
 /// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches, so that a loop over it
 /// becomes vector instructions, and with the same bits on every machine.
@@ -41,7 +41,7 @@ pub fn kernel(r_squared: f64) -> f64 {
     }
 }
 
-vectorised! {
+vectorised_wider! {
     /// phi(||site - p||) for each point p, into `values`.
     pub fn kernels(site: Point, points: &[Point], values: &mut [f64]) {
         for (value, p) in values.iter_mut().zip(points) {
@@ -51,7 +51,7 @@ vectorised! {
     }
 }
 
-vectorised! {
+vectorised_wider! {
     /// The gradient with respect to the place p of phi(||site - p||) for each site, one axis after the other: (2 ln r + 1) (p - site), and 0 at a site.
     pub fn kernel_gradients(p: Point, sites: &[Point], x: &mut [f64], y: &mut [f64]) {
         for ((s, x), y) in sites.iter().zip(x).zip(y) {
