@@ -52,7 +52,7 @@ macro_rules! vectorised_wider {
 }
 pub(crate) use vectorised_wider;
 
-/// Whether the processor has the instructions of [`vectorised_wider`].
+/// Whether the processor has the instructions that `vectorised_wider` asks for.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 pub fn has_avx512() -> bool {
