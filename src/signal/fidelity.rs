@@ -26,9 +26,27 @@ pub fn fit_to_error(
     pins: &[Pin],
 ) -> Result<Fit, FitError> {
     check(frames, most, layout, pins)?;
-    let start = Instant::now();
-    let whole = shape_signal(frames, frames.ncols() - 1)?;
-    choose(frames, &whole, start.elapsed(), most, rule, layout, pins)
+    choose(&Whole::new(frames)?, most, rule, layout, pins)
+}
+
+/// Frames (d x n) with their shape signal of all dimensions, and the time it took.
+pub(super) struct Whole<'a> {
+    pub frames: MatRef<'a, f64>,
+    pub shape: ShapeSignal,
+    pub time: Duration,
+}
+
+impl<'a> Whole<'a> {
+    /// Of at least one frame.
+    pub fn new(frames: MatRef<'a, f64>) -> Result<Self, FitError> {
+        let start = Instant::now();
+        let shape = shape_signal(frames, frames.ncols() - 1)?;
+        Ok(Self {
+            frames,
+            shape,
+            time: start.elapsed(),
+        })
+    }
 }
 
 pub(super) fn check(
@@ -48,16 +66,20 @@ pub(super) fn check(
     Ok(validate_pins(pins, n)?)
 }
 
-/// [`fit_to_error`], given the shape signal of all dimensions and the time it took.
+/// [`fit_to_error`], given the shape signal of all dimensions.
 pub(super) fn choose(
-    frames: MatRef<'_, f64>,
-    whole: &ShapeSignal,
-    h_time: Duration,
+    whole: &Whole,
     most: f64,
     rule: KnotRule,
     layout: Layout,
     pins: &[Pin],
 ) -> Result<Fit, FitError> {
+    let Whole {
+        frames,
+        shape: whole,
+        time: h_time,
+    } = whole;
+    let (frames, h_time) = (*frames, *h_time);
     let mut dimensions: Vec<usize> = SHARES
         .iter()
         .map(|share| least_m(whole, share * most))

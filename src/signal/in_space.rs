@@ -4,13 +4,13 @@
 use faer::{Mat, MatRef};
 use thiserror::Error;
 
-use super::fidelity::fit_to_error;
+use super::fidelity::{Whole, check, choose};
 use super::fit::{Fit, FitError, FitOptions, fit};
 use super::knots::KnotRule;
 use super::layout::Layout;
 use super::pins::Pin;
 use super::psi::Representation;
-use super::refine::tolerance::fit_to_error_refined;
+use super::refine::tolerance::choose_refined;
 use super::refine::{RefineOptions, Refinement, refine};
 use crate::shape::{ShapeError, Space, decode_all, encode_all};
 
@@ -78,12 +78,12 @@ pub fn fit_in_space_to_rms(
     layout: Layout,
     pins: &[Pin],
 ) -> Result<SpaceFit, SpaceFitError> {
-    let staged = |z: MatRef<'_, f64>, most| Ok((fit_to_error(z, most, knots, layout, pins)?, ()));
+    let staged = |whole: &Whole, most| Ok((choose(whole, most, knots, layout, pins)?, ()));
     let interpolating = |z: MatRef<'_, f64>| Ok((interpolate(z, knots, layout, pins)?, ()));
-    Ok(to_rms(space, frames, rms, staged, interpolating)?.0)
+    Ok(to_rms(space, frames, rms, (layout, pins), staged, interpolating)?.0)
 }
 
-/// The same with what [`fit_to_error_refined`] chooses.
+/// The same with what [`super::refine::tolerance::fit_to_error_refined`] chooses.
 pub fn fit_in_space_to_rms_refined(
     space: &dyn Space,
     frames: &[f64],
@@ -93,14 +93,13 @@ pub fn fit_in_space_to_rms_refined(
     pins: &[Pin],
     options: &RefineOptions,
 ) -> Result<(SpaceFit, Refinement), SpaceFitError> {
-    let refined =
-        |z: MatRef<'_, f64>, most| fit_to_error_refined(z, most, knots, layout, pins, options);
+    let refined = |whole: &Whole, most| choose_refined(whole, most, knots, layout, pins, options);
     let interpolating = |z: MatRef<'_, f64>| {
         let fit = interpolate(z, knots, layout, pins)?;
         let untouched = Refinement::none(&fit, options);
         Ok((fit, untouched))
     };
-    to_rms(space, frames, rms, refined, interpolating)
+    to_rms(space, frames, rms, (layout, pins), refined, interpolating)
 }
 
 fn interpolate(
@@ -124,13 +123,16 @@ fn to_rms<T>(
     space: &dyn Space,
     frames: &[f64],
     rms: f64,
-    to_error: impl Fn(MatRef<'_, f64>, f64) -> Result<(Fit, T), FitError>,
+    (layout, pins): (Layout, &[Pin]),
+    to_error: impl Fn(&Whole, f64) -> Result<(Fit, T), FitError>,
     last_resort: impl Fn(MatRef<'_, f64>) -> Result<(Fit, T), FitError>,
 ) -> Result<(SpaceFit, T), SpaceFitError> {
     if !(rms > 0.0 && rms.is_finite()) {
         return Err(FitError::BadTolerance { value: rms }.into());
     }
     let z = encode_all(space, frames)?;
+    check(z.as_ref(), rms, layout, pins)?;
+    let whole = Whole::new(z.as_ref())?;
     let given = MatRef::from_column_major_slice(frames, space.frame_len(), z.ncols());
     let allowed = rms * rms * frames.len() as f64 / 3.0;
     let mut most = spread(z.as_ref()) * (allowed / spread(given).max(f64::MIN_POSITIVE)).min(1.0);
@@ -138,7 +140,7 @@ fn to_rms<T>(
     // The greatest error in S that met the tolerance, and the least that did not.
     let (mut met, mut missed) = (0.0, f64::INFINITY);
     for _ in 0..ATTEMPTS {
-        let (fit, told) = to_error(z.as_ref(), most.max(f64::MIN_POSITIVE))?;
+        let (fit, told) = to_error(&whole, most.max(f64::MIN_POSITIVE))?;
         let found = rms_after_decoding(space, frames, &fit.representation)?;
         let estimate = AIM * most * (rms / found.max(f64::MIN_POSITIVE)).powi(2);
         if found > rms {
@@ -267,6 +269,8 @@ mod tests {
         };
         let (fine, coarse) = (fit(0.005).unwrap(), fit(0.05).unwrap());
         assert!(fine.rms <= 0.005 && coarse.rms <= 0.05);
+        // What is allowed is used.
+        assert!(fine.rms > 0.5 * 0.005 && coarse.rms > 0.5 * 0.05);
         assert!(
             coarse.fit.representation.stored_numbers() < fine.fit.representation.stored_numbers()
         );

@@ -6,9 +6,9 @@ use faer::MatRef;
 
 use super::rows::Rows;
 use super::{RefineOptions, Refinement, minimise_until, refine_within};
-use crate::signal::fidelity::{check, choose, leading, least, least_m};
+use crate::signal::fidelity::{Whole, check, choose, leading, least, least_m};
 use crate::signal::fit::{Attempt, Base, Fit, FitError, error_h};
-use crate::signal::h::{ShapeSignal, shape_signal};
+use crate::signal::h::ShapeSignal;
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
 use crate::signal::pins::Pin;
@@ -35,21 +35,38 @@ pub fn fit_to_error_refined(
     options: &RefineOptions,
 ) -> Result<(Fit, Refinement), FitError> {
     check(frames, most, layout, pins)?;
+    let whole = Whole::new(frames)?;
+    choose_refined(&whole, most, rule, layout, pins, options)
+}
+
+/// [`fit_to_error_refined`], given the shape signal of all dimensions.
+pub(in crate::signal) fn choose_refined(
+    whole: &Whole,
+    most: f64,
+    rule: KnotRule,
+    layout: Layout,
+    pins: &[Pin],
+    options: &RefineOptions,
+) -> Result<(Fit, Refinement), FitError> {
     let start = Instant::now();
-    let whole = shape_signal(frames, frames.ncols() - 1)?;
-    let h_time = start.elapsed();
-    let staged = choose(frames, &whole, h_time, most, rule, layout, pins)?;
-    let least = least_m(&whole, SHARE * most);
+    let staged = choose(whole, most, rule, layout, pins)?;
+    let Whole {
+        frames,
+        shape: whole,
+        time: h_time,
+    } = whole;
+    let (frames, h_time) = (*frames, *h_time);
+    let least = least_m(whole, SHARE * most);
     let mut best = (staged.representation.stored_numbers(), staged);
     let mut found = None;
     for m in least..(least + DIMENSIONS).min(whole.basis.ncols() + 1) {
-        let shape = leading(&whole, m);
+        let shape = leading(whole, m);
         let error = error_h(frames, &shape);
         let mut base = Base::from_shape(shape, error, h_time, layout, pins)?;
         base.settle(rule)?;
         let search = Search {
             base,
-            whole: &whole,
+            whole,
             most,
             rule,
             options: RefineOptions {
@@ -70,12 +87,12 @@ pub fn fit_to_error_refined(
         }
     }
     let (fit, short) = (best.1, found.unwrap_or(*options));
-    let (refined, told) = refine_within(&whole, fit.clone(), options, 0.0);
+    let (refined, told) = refine_within(whole, fit.clone(), options, 0.0);
     let (refined, mut told) = match told.after <= most {
         true => (refined, told),
-        false => refine_within(&whole, fit, &short, most),
+        false => refine_within(whole, fit, &short, most),
     };
-    told.elapsed = start.elapsed();
+    told.elapsed = h_time + start.elapsed();
     Ok((refined, told))
 }
 
