@@ -54,7 +54,7 @@ pub fn exhibit(_: &DataFolders) -> Result<Exhibit, ExhibitError> {
     let shown: Vec<f64> = new.iter().copied().step_by(3).collect();
     let made = after.evaluate(&shown);
     let at = |t: &f64| after.time.evaluate(*t);
-    let before = (1..=n).map(|i| time.evaluate(i as f64)).collect();
+    let before = time.curve(1);
     let strip = poses(
         "Every third of the new frames",
         &made,

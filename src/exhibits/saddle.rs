@@ -112,13 +112,13 @@ fn around(run: &Run, time: f64) -> Panel {
     let reach = beside.map(|p| crate::signal::distance(p, middle));
     let half = AROUND * reach[0].max(reach[1]);
     let corners = [middle.map(|x| x - half), middle.map(|x| x + half)];
-    let frames = (1..=signal.frame_count()).map(|i| signal.evaluate(i as f64));
+    let frames = signal.curve(1);
     let shown = shown(time).map(|t| signal.evaluate(t));
     let title = format!("{}: around f({time})", run.layout);
     let lines = vec![
         line("shown below", Style::Squares, shown.to_vec()),
         line("time signal f", Style::Line, curve(signal)),
-        line("f(i)", Style::Dots, frames.collect()),
+        line("f(i)", Style::Dots, frames),
     ];
     plane(title, run, corners, lines)
 }

@@ -5,10 +5,7 @@ use super::{Chart, Line, Panel, Style};
 use crate::sequence::Sequence;
 use crate::sequence::dataset::{DataFolders, DatasetError};
 use crate::signal::fit::Fit;
-use crate::signal::psi::TimeSignal;
-
-/// Points of f drawn between two frames.
-const PER_FRAME: usize = 12;
+use crate::signal::psi::{SMOOTH, TimeSignal};
 
 /// The real dataset where it is, else the embedded one; with its name.
 pub fn either(
@@ -25,9 +22,7 @@ pub fn either(
 
 /// f over its frames, densely.
 pub fn curve(time: &TimeSignal) -> Vec<[f64; 2]> {
-    let last = time.frame_count().saturating_sub(1) * PER_FRAME;
-    let times = (0..=last).map(|i| 1.0 + i as f64 / PER_FRAME as f64);
-    times.map(|t| time.evaluate(t)).collect()
+    time.curve(SMOOTH)
 }
 
 /// A line of a chart.

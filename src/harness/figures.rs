@@ -9,11 +9,10 @@ use crate::sequence::Sequence;
 use crate::shape::{Space, encode_all, prepare_for};
 use crate::signal::fit::Fit;
 use crate::signal::in_space::{mean_squares, rms_after_decoding};
+use crate::signal::psi::SMOOTH;
 use crate::stages::StageError;
 use crate::stages::signal::Choice;
 
-/// Points of f drawn between two frames.
-const PER_FRAME: usize = 12;
 /// Values tried of each of k, l and m.
 const STEPS: usize = 10;
 
@@ -24,7 +23,6 @@ pub fn draw(case: &Case, sequence: &Sequence) -> Result<FitFigures, StageError> 
     let (k, l, m) = fit.klm();
     let n = sequence.frame_count();
     let time = &fit.representation.time;
-    let dense = (0..=(n - 1) * PER_FRAME).map(|i| 1.0 + i as f64 / PER_FRAME as f64);
     let base = &case.choice;
     Ok(FitFigures {
         case: case.name.clone(),
@@ -36,8 +34,8 @@ pub fn draw(case: &Case, sequence: &Sequence) -> Result<FitFigures, StageError> 
         d: frames.z.nrows(),
         frames: n,
         positions: fit.positions.clone(),
-        frame_points: (1..=n).map(|i| time.evaluate(i as f64)).collect(),
-        curve: dense.map(|t| time.evaluate(t)).collect(),
+        frame_points: time.curve(1),
+        curve: time.curve(SMOOTH),
         control: time.spline.control.clone(),
         sites: fit.sites.order.clone(),
         frame_errors: frames.errors(&fit)?,

@@ -9,6 +9,8 @@ use super::g::PoseSignal;
 use super::rho::Rho;
 use crate::linalg::kernels::combine;
 
+/// So many points of [`TimeSignal::curve`] a frame look smooth when drawn.
+pub const SMOOTH: usize = 12;
 /// Numbers of a frame worked on at a time, so that they stay in cache while H is read once.
 const BLOCK: usize = 512;
 
@@ -41,6 +43,13 @@ impl TimeSignal {
     pub fn evaluate_all(&self, times: &[f64]) -> Vec<Point> {
         let parameters: Vec<f64> = times.iter().map(|&t| self.rho.evaluate(t)).collect();
         self.spline.evaluate_all(&parameters)
+    }
+
+    /// f at the n frames and at `between` - 1 times between every two of them, in order: `between` (n - 1) + 1 points, those of the frames for 1.
+    pub fn curve(&self, between: usize) -> Vec<Point> {
+        let last = self.frame_count().saturating_sub(1) * between;
+        let times = (0..=last).map(|i| 1.0 + i as f64 / between as f64);
+        times.map(|t| self.evaluate(t)).collect()
     }
 
     /// n, the number of frames represented.

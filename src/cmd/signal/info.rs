@@ -9,6 +9,7 @@ use super::super::Outcome;
 use super::super::output::{Draft, check_place, draft_json, say};
 use crate::report::{PlotError, PosePlane, pose_plane};
 use crate::signal::file::Stored;
+use crate::signal::psi::SMOOTH;
 use crate::signal::windows_file::WindowsFile;
 
 pub const EXAMPLES: &str = "Examples:
@@ -16,9 +17,6 @@ pub const EXAMPLES: &str = "Examples:
   meshseq signal info roam.npz --json roam.json
   meshseq signal fit @gallop-small --tolerance 0.01 -o gallop.npz
   meshseq signal info gallop.npz --places gallop.csv --plot gallop.svg";
-
-/// Points of f drawn between two frames.
-const PER_FRAME: usize = 12;
 
 #[derive(Args)]
 pub struct InfoVerb {
@@ -114,17 +112,13 @@ fn plot(name: &str, stored: &Stored) -> Result<String, PlotError> {
         &stored.representation.time,
         &stored.representation.pose.sites,
     );
-    let n = time.frame_count();
-    let dense = (0..=n.saturating_sub(1) * PER_FRAME).map(|i| 1.0 + i as f64 / PER_FRAME as f64);
-    let curve: Vec<_> = dense.map(|t| time.evaluate(t)).collect();
-    let frame_points: Vec<_> = (1..=n).map(|i| time.evaluate(i as f64)).collect();
     let is_site = |&i: &usize| sites.contains(&stored.positions[i]);
     let sites: Vec<usize> = (0..stored.positions.len()).filter(is_site).collect();
     pose_plane(&PosePlane {
         name,
         positions: &stored.positions,
-        frame_points: &frame_points,
-        curve: &curve,
+        frame_points: &time.curve(1),
+        curve: &time.curve(SMOOTH),
         control: &time.spline.control,
         sites: &sites,
     })
