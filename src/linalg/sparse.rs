@@ -122,6 +122,8 @@ impl Pattern {
             values: vec![0.0; self.factor_len()],
             sweeps: Sweeps::default(),
         };
+        let supernodes = each_supernode(&self.0.symbolic, &factor.values);
+        factor.sweeps.reserve(supernodes);
         factor.refactor(values)?;
         Ok(factor)
     }
@@ -161,7 +163,6 @@ impl Factor {
             return Err(FactorError::NotPositiveDefinite { pivot: index, n });
         }
         self.sweeps.clear();
-        self.sweeps.reserve(each_supernode(symbolic, &self.values));
         for supernode in each_supernode(symbolic, &self.values) {
             self.sweeps.push(supernode);
         }

@@ -47,6 +47,9 @@ const FAR: f64 = 1e6;
 
 /// An error where a pin is not among the shape coordinates (m x n). O(m n).
 pub(super) fn check_distance(pins: &[Pin], coordinates: MatRef<'_, f64>) -> Result<(), PinError> {
+    if pins.is_empty() {
+        return Ok(());
+    }
     let columns = coordinates.col_iter();
     let extent = columns.map(|x| x.norm_l2()).fold(0.0, f64::max);
     let far = |pin: &&Pin| pin.position[0].hypot(pin.position[1]) > FAR * extent;
