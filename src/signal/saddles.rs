@@ -231,6 +231,21 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_held_for_some_frames_is_measured_by_the_motion_around_it() {
+        let z = Mat::from_fn(3, 24, |a, i| {
+            let t = 0.4
+                * if i < 10 {
+                    i
+                } else {
+                    i.saturating_sub(5).max(10)
+                } as f64;
+            [10.0 * t.cos(), 10.0 * t.sin(), 3.0 * (0.7 * t).sin()][a]
+        });
+        let found = places(&fit(z.as_ref(), &FitOptions::new(14, 10, 3)).unwrap());
+        assert!(found.iter().all(|p| p.stray < 10.0), "{found:?}");
+    }
+
+    #[test]
     fn frames_that_stand_still_are_no_place_to_go_astray() {
         let z = Mat::from_fn(5, 8, |a, _| a as f64);
         let options = FitOptions {
