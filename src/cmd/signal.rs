@@ -50,7 +50,8 @@ diagonal; that of Karni & Gotsman 2004; and the in-betweens that leave the neigh
 frames by more than a quarter of a step.
 
 The .npz holds h0 (d), H (m, d), sites (l, 2), g (l + 3, m), control (k, 2), u (k + 2), t (n), the
-frames' places p (n, 2), F (F, 3), meta, and, but for vertex space, reference (V, 3).";
+frames' places p (n, 2), F (F, 3), meta; but for vertex space, reference (V, 3); in patch space,
+patches (F).";
 
 #[derive(Subcommand)]
 pub enum Signal {

@@ -30,7 +30,7 @@ pub struct Outputs {
 pub fn advice(numbers: &Value, kind: SpaceKind) -> &'static str {
     match numbers["faces_turned"] == 0 || kind != SpaceKind::Vertex {
         true => "",
-        false => "; --space gradient turns fewer",
+        false => "; in gradient space there are often fewer",
     }
 }
 

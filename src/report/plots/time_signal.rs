@@ -59,16 +59,16 @@ pub fn pose_plane(plane: &PosePlane) -> Result<String, PlotError> {
 
 /// The same of a fit on record.
 pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
-    let figures = &PosePlane::from(figures);
-    let shown = Shown::new(figures);
+    let plane = &PosePlane::from(figures);
+    let shown = Shown::new(plane);
     let all = shown.all();
     let total: usize = all.iter().map(|p| p.len()).sum();
     let kept: usize = all.iter().flat_map(|p| p.iter().flatten()).count();
     let given = [
-        figures.curve,
-        figures.frame_points,
-        figures.positions,
-        figures.control,
+        plane.curve,
+        plane.frame_points,
+        plane.positions,
+        plane.control,
     ];
     let not_numbers = total - given.iter().map(|p| finite(p).count()).sum::<usize>();
     let beyond = total - kept - not_numbers;
@@ -80,7 +80,7 @@ pub(in crate::report) fn picture(figures: &FitFigures) -> Picture {
         look: "Look for the path of the motion: frames near each other here have similar shapes, a cycle closes on itself, and the line from a \
                diamond to its dot is what the time signal smooths away. The numbers count frames from 1."
             .into(),
-        svg: draw(figures, &shown),
+        svg: draw(plane, &shown),
         notes: note_left_out(not_numbers, total, "points")
             .into_iter()
             .chain(note_beyond)
@@ -105,8 +105,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(figures: &PosePlane) -> Self {
-        let sets = [figures.positions, figures.frame_points, figures.curve];
+    fn new(plane: &PosePlane) -> Self {
+        let sets = [plane.positions, plane.frame_points, plane.curve];
         let base = sets.iter().find(|p| finite(p).next().is_some());
         let limits = base.map(|points| limits(points));
         let within = |p: [f64; 2]| {
@@ -116,10 +116,10 @@ impl Shown {
         };
         let shown = |points: &[[f64; 2]]| points.iter().map(|&p| within(p)).collect();
         Self {
-            curve: shown(figures.curve),
-            frames: shown(figures.frame_points),
-            positions: shown(figures.positions),
-            control: shown(figures.control),
+            curve: shown(plane.curve),
+            frames: shown(plane.frame_points),
+            positions: shown(plane.positions),
+            control: shown(plane.control),
         }
     }
 
@@ -155,7 +155,7 @@ fn runs(canvas: &Canvas, points: &[Option<[f64; 2]>]) -> Vec<Vec<Place>> {
         .collect()
 }
 
-fn draw(figures: &PosePlane, shown: &Shown) -> Result<String, PlotError> {
+fn draw(plane: &PosePlane, shown: &Shown) -> Result<String, PlotError> {
     if shown
         .curve
         .iter()
@@ -169,9 +169,9 @@ fn draw(figures: &PosePlane, shown: &Shown) -> Result<String, PlotError> {
     let (x, y, height) = equal_axes(shown);
     let label = format!(
         "Time signal of {}: a curve over the pose plane through {} frames, with {} sites",
-        figures.name,
-        figures.frame_points.len(),
-        figures.sites.len()
+        plane.name,
+        plane.frame_points.len(),
+        plane.sites.len()
     );
     let frame = Frame {
         size: (WIDTH, height),
@@ -192,7 +192,7 @@ fn draw(figures: &PosePlane, shown: &Shown) -> Result<String, PlotError> {
     chart(&frame, |canvas| {
         polygon(canvas, &shown.control)?;
         let on_curve = curve(canvas, &shown.curve)?;
-        positions(canvas, shown, figures.sites)?;
+        positions(canvas, shown, plane.sites)?;
         frames(canvas, &shown.frames, &on_curve)
     })
 }
