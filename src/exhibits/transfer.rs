@@ -129,7 +129,7 @@ fn moved(given: &Given, n: usize, kind: SpaceKind) -> Result<Moved, ExhibitError
     let every: Vec<f64> = (1..=n).map(|i| i as f64).collect();
     let faces = given.target.connectivity().faces();
     let orientation = Orientation::new(given.target.frame(0), faces);
-    let before = orientation.turned_in_any(given.target.positions());
+    let before = orientation.not_clear(given.target.positions());
     let newly = orientation.newly_turned(&sample(&every)?, &before);
     Ok(Moved {
         shown: sample(&SHOWN)?,

@@ -1,7 +1,10 @@
 //! Faces that a deformation has turned inside out.
 //!
 //! A triangle in space has no inside of its own; its surroundings give it one. The rotation that best takes a face's neighbourhood from the reference
-//! to the frame says where its normal should point, and a normal that points to the other side is turned.
+//! to the frame says where its normal should point, and a normal that points to the other side is turned. Two neighbourhoods are asked: the vertices
+//! that share an edge with a corner, and those around these. Within a fold the smaller one goes along with it and may take the wrong side for the right
+//! one; where a surface is rolled up tightly the larger one is not a rotation of the reference. So a face is turned where both say so, and clear of it
+//! where neither does.
 
 use rayon::prelude::*;
 
@@ -41,28 +44,21 @@ impl<'a> Orientation<'a> {
         }
     }
 
-    /// The 0-based faces of a frame (3V positions) whose normal is more than a right angle from the reference's, turned as the face's corners and
-    /// their neighbours have turned (the rotation nearest to their covariance). Faces without a normal are none of them. O(V + F).
+    /// The 0-based faces of a frame (3V positions), ascending, whose normal is more than a right angle from the reference's turned as both of their
+    /// neighbourhoods have turned (the rotation nearest to their covariance). Faces without a normal are none of them. O(V + F).
     pub fn turned(&self, frame: &[f64]) -> Vec<u32> {
-        let is_turned = |f: &usize| {
-            let expected = normal(self.reference, self.faces[*f]);
-            let found = normal(frame, self.faces[*f]);
-            dot(
-                found,
-                apply(&self.rotation(self.faces[*f], frame), expected),
-            ) < 0.0
-        };
-        let faces = (0..self.faces.len()).into_par_iter();
-        faces.filter(is_turned).map(|f| f as u32).collect()
+        self.faces_where(frame, |[near, far]| near && far)
     }
 
-    /// Faces that are turned in any of these frames (3V positions each), ascending, each once.
-    pub fn turned_in_any(&self, frames: &[f64]) -> Vec<u32> {
+    /// Faces that either neighbourhood takes to be turned in any of these frames (3V positions each), ascending, each once.
+    pub fn not_clear(&self, frames: &[f64]) -> Vec<u32> {
         let each = frames.chunks_exact(self.reference.len().max(1));
-        let mut turned: Vec<u32> = each.flat_map(|frame| self.turned(frame)).collect();
-        turned.sort_unstable();
-        turned.dedup();
-        turned
+        let mut faces: Vec<u32> = each
+            .flat_map(|frame| self.faces_where(frame, |[near, far]| near || far))
+            .collect();
+        faces.sort_unstable();
+        faces.dedup();
+        faces
     }
 
     /// Of each frame (3V positions) the faces that are turned in it and not among `before`, which ascend.
@@ -76,21 +72,39 @@ impl<'a> Orientation<'a> {
         each.map(newly).collect()
     }
 
-    fn rotation(&self, face: [u32; 3], frame: &[f64]) -> Matrix {
-        let mut around: Vec<u32> = face
-            .iter()
-            .flat_map(|&v| {
-                let range = self.starts[v as usize]..self.starts[v as usize + 1];
-                &self.neighbours[range.start as usize..range.end as usize]
-            })
-            .copied()
-            .chain(face)
-            .collect();
+    /// Faces for which `is` holds of what the smaller and the larger neighbourhood say.
+    fn faces_where(&self, frame: &[f64], is: impl Fn([bool; 2]) -> bool + Sync) -> Vec<u32> {
+        let holds = |f: &usize| {
+            let face = self.faces[*f];
+            let (expected, found) = (normal(self.reference, face), normal(frame, face));
+            let turned = |around: &[u32]| {
+                let rotation = self.rotation(around, frame);
+                dot(found, apply(&rotation, expected)) < 0.0
+            };
+            let near = self.around(&face);
+            is([turned(&near), turned(&self.around(&near))])
+        };
+        let faces = (0..self.faces.len()).into_par_iter();
+        faces.filter(holds).map(|f| f as u32).collect()
+    }
+
+    /// These vertices and their neighbours, ascending.
+    fn around(&self, vertices: &[u32]) -> Vec<u32> {
+        let mut around = vertices.to_vec();
+        for &v in vertices {
+            let range = self.starts[v as usize]..self.starts[v as usize + 1];
+            around.extend(&self.neighbours[range.start as usize..range.end as usize]);
+        }
         around.sort_unstable();
         around.dedup();
-        let (from, to) = (mean(self.reference, &around), mean(frame, &around));
+        around
+    }
+
+    /// The rotation nearest to what takes these vertices of the reference to those of the frame.
+    fn rotation(&self, around: &[u32], frame: &[f64]) -> Matrix {
+        let (from, to) = (mean(self.reference, around), mean(frame, around));
         let mut covariance = [[0.0; 3]; 3];
-        for &v in &around {
+        for &v in around {
             let (x, y) = (
                 sub(point(self.reference, v), from),
                 sub(point(frame, v), to),
@@ -181,5 +195,24 @@ mod tests {
         for f in turned {
             assert!(faces[f as usize].contains(&(3 * 8 + 3)));
         }
+    }
+
+    /// A sheet folded over along a crease: the half that is laid over is no more inside out than the other, and beside the crease, where a neighbourhood
+    /// has both halves, no face is turned for certain.
+    #[test]
+    fn a_fold_turns_nothing_for_certain() {
+        let (rest, faces) = sheet(8);
+        let orientation = Orientation::new(&rest, &faces);
+        let folded = mapped(&rest, |[x, y, z]| match x > 3.5 {
+            true => [7.0 - x, y, -z - 0.01],
+            false => [x, y, z],
+        });
+        let (turned, doubtful) = (orientation.turned(&folded), orientation.not_clear(&folded));
+        assert!(turned.iter().all(|f| doubtful.contains(f)));
+        let beside = |f: &u32| {
+            let across = faces[*f as usize].map(|v| v % 8);
+            across.iter().all(|x| (1..=6).contains(x))
+        };
+        assert!(doubtful.iter().all(beside), "{doubtful:?}");
     }
 }

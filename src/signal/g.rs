@@ -1,12 +1,12 @@
 //! The pose signal g: a thin-plate approximation from the pose plane to shape coordinates (sections 2.2 and 3.2).
 
-use faer::{Mat, MatRef};
+use faer::{Accum, Mat, MatRef};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::Point;
 use super::thin_plate::{Frame, kernels};
-use crate::linalg::dense::Qr;
+use crate::linalg::dense::{Cholesky, Qr, multiply};
 use crate::linalg::kernels::{axpy, combine};
 use crate::linalg::panels::Panels;
 
@@ -49,8 +49,8 @@ impl PoseSignal {
     /// Minimises (4) over all frames for sites at `points[sites[j]]`, under the side conditions sum_j g_j = 0 and sum_j g_j s_j^T = 0 (reading 4).
     ///
     /// `coordinates` is m x n with a column for each of the n points. Through the QR of the l x 3 matrix [1 s], whose null space leaves an n x l
-    /// system, solved by another QR: O(n l^2). With l = 3 sites an affine map; with l = n an interpolant. Where the sites do not span the plane
-    /// (collinear or coincident), g is constant across them.
+    /// system, solved by another QR: O(n l^2). With l = 3 sites an affine map; with l = n an interpolant, whose system is symmetric and positive
+    /// definite there: a quarter of the work. Where the sites do not span the plane (collinear or coincident), g is constant across them.
     pub fn fit(
         points: &[Point],
         coordinates: MatRef<'_, f64>,
@@ -60,17 +60,19 @@ impl PoseSignal {
         let frame = Frame::new(&chosen);
         let normalised: Vec<Point> = chosen.iter().map(|&p| frame.normalise(p)).collect();
         check_apart(&normalised)?;
-        let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
-        let design = Design::new(&normalised, frame.affine, &queries);
-        let mut right = coordinates.transpose().to_owned();
-        let qr = Qr::new(design.matrix(&queries));
-        qr.apply_transpose(&mut right);
-        let solution = qr.solve_upper(&right);
-        let weights = design.kernel_weights(&solution);
-        let affine = frame.affine;
-        let affine_part = solution.get(..affine, ..);
+        let interpolated = (sites.len() == points.len())
+            .then(|| interpolant(&normalised, frame.affine, coordinates, sites))
+            .flatten();
+        let (weights, affine_part) = interpolated.unwrap_or_else(|| {
+            let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
+            let design = Design::new(&normalised, frame.affine, &queries);
+            let mut right = coordinates.transpose().to_owned();
+            let qr = Qr::new(design.matrix(&queries));
+            qr.apply_transpose(&mut right);
+            design.parts(&qr.solve_upper(&right))
+        });
         Ok(Self {
-            coefficients: in_given_units(&frame, &normalised, &weights, affine_part),
+            coefficients: in_given_units(&frame, &normalised, &weights, affine_part.as_ref()),
             sites: chosen,
         })
     }
@@ -134,6 +136,35 @@ impl PoseSignal {
     }
 }
 
+/// The weights of the kernels and the affine part, one a row, of the g that takes each site to its point's coordinates, or None where rounding leaves
+/// its matrix indefinite: kernels are positive definite on the weights that meet the side conditions.
+fn interpolant(
+    sites: &[Point],
+    affine: usize,
+    coordinates: MatRef<'_, f64>,
+    places: &[usize],
+) -> Option<(Mat<f64>, Mat<f64>)> {
+    let design = Design::new(sites, affine, sites);
+    // Q^T Phi Q, by the symmetry of Phi.
+    let mut conditioned = design.bends.transpose().to_owned();
+    design.side.apply_transpose(&mut conditioned);
+    let mut right = Mat::from_fn(sites.len(), coordinates.nrows(), |j, a| {
+        coordinates[(a, places[j])]
+    });
+    design.side.apply_transpose(&mut right);
+    let factor = Cholesky::new(conditioned.get(affine.., affine..).to_owned())?;
+    let (mut head, mut weights) = right.split_at_row_mut(affine);
+    factor.solve_many(weights.as_mut());
+    multiply(
+        head.as_mut(),
+        Accum::Add,
+        (-conditioned.get(..affine, affine..)).as_ref(),
+        weights.as_ref(),
+    );
+    let affine_part = design.side.solve_upper(&head.to_owned());
+    Some((design.kernel_weights(&right), affine_part))
+}
+
 /// The functions of the pose plane that meet the side conditions, for l sites that span an affine space of functions of dimension `affine`: 1, x
 /// and y of it, and l - affine sums of kernels. Sites and points are in the coordinates of a [`Frame`].
 pub(super) struct Design {
@@ -171,6 +202,12 @@ impl Design {
                 self.bends[(j, i)]
             }
         })
+    }
+
+    /// The weights of the l kernels and the affine part, one a row, from the coefficients of the functions.
+    pub fn parts(&self, solution: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
+        let affine_part = solution.get(..self.affine, ..).to_owned();
+        (self.kernel_weights(solution), affine_part)
     }
 
     /// The weights of the l kernels, one a row, from the coefficients of the functions.

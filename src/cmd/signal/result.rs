@@ -67,7 +67,7 @@ impl Outputs {
         let sequence = frames_at(stored, &times, Path::new("the new representation"))?;
         let faces = sequence.connectivity().faces();
         let orientation = Orientation::new(&examples[..sequence.dimension()], faces);
-        let before = orientation.turned_in_any(examples);
+        let before = orientation.not_clear(examples);
         let turned = orientation.newly_turned(sequence.positions(), &before);
         numbers["faces_turned"] = turned.iter().map(Vec::len).sum::<usize>().into();
         numbers["faces_turned_in_examples"] = before.len().into();
