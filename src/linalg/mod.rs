@@ -3,7 +3,9 @@
 
 pub mod appended_qr;
 pub mod banded;
+pub mod compressed;
 pub mod dense;
+pub mod elimination;
 pub mod kernels;
 pub mod panels;
 pub mod pca;

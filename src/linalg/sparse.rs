@@ -1,21 +1,17 @@
 //! Sparse symmetric positive definite systems: a pattern is analysed once, numbers are factored often, right-hand sides are solved often.
 //!
-//! P A P^T = L L^T, with a fill-reducing order P by approximate minimum degree and L kept in supernodes (runs of columns with one pattern of rows,
-//! stored as dense column-major blocks), both by faer. The triangular solves are our own (`sweeps`).
+//! P A P^T = L L^T, with a fill-reducing order P by approximate minimum degree and L (`elimination`), both by faer. The triangular solves are our own
+//! (`sweeps`).
 
 use std::sync::Arc;
 
-use faer::Par;
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::SymbolicSupernodalParams;
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::amd;
-use faer::sparse::linalg::cholesky::{simplicial, supernodal};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use thiserror::Error;
 
-use super::kernels::clear_upper_halves;
-use super::sweeps::{Supernode, Sweeps};
+use super::compressed::Compressed;
+use super::elimination::Elimination;
+use super::sweeps::Sweeps;
 
 /// Why a sparse system has no factor.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -53,11 +49,9 @@ pub struct Pattern(Arc<Analysis>);
 #[derive(Debug)]
 struct Analysis {
     n: usize,
-    /// The lower triangle of P A P^T.
-    lower: Compressed,
     /// `order[i]` is the given index of the unknown eliminated as number i.
     order: Vec<u32>,
-    symbolic: supernodal::SymbolicSupernodalCholesky<u32>,
+    elimination: Elimination,
 }
 
 /// L for one set of values.
@@ -89,19 +83,14 @@ impl Pattern {
         let given = Compressed::new(n, entries.iter().map(|&[r, c]| [r.min(c), r.max(c)]));
         let (order, position) = minimum_degree(&given)?;
         let moved = given.entries().map(|e| e.map(|i| position[i as usize]));
-        let mut lower = Compressed::new(n, moved.map(|[r, c]| [r.max(c), r.min(c)]));
-        let upper = Compressed::new(n, lower.entries().map(|[row, column]| [column, row]));
-        lower.slots = given
-            .slots
-            .iter()
-            .map(|&s| lower.slots[s as usize])
-            .collect();
-        let symbolic = supernodes(&upper)?;
+        let mut upper = Compressed::new(n, moved.map(|[r, c]| [r.min(c), r.max(c)]));
+        let slots = given.slots.iter().map(|&s| upper.slots[s as usize]);
+        upper.slots = slots.collect();
+        let elimination = Elimination::new(upper);
         Ok(Self(Arc::new(Analysis {
             n,
-            lower,
             order,
-            symbolic,
+            elimination: elimination.map_err(|_| FactorError::TooLarge { n })?,
         })))
     }
 
@@ -110,9 +99,9 @@ impl Pattern {
         self.0.n
     }
 
-    /// Numbers kept for L, the zeros in its dense blocks included.
+    /// Numbers kept for L, with the zeros in dense blocks where it has them.
     pub fn factor_len(&self) -> usize {
-        self.0.symbolic.len_val()
+        self.0.elimination.factor_len()
     }
 
     /// Factors the matrix with these values, in the order of the entries.
@@ -122,7 +111,7 @@ impl Pattern {
             values: vec![0.0; self.factor_len()],
             sweeps: Sweeps::default(),
         };
-        let supernodes = each_supernode(&self.0.symbolic, &factor.values);
+        let supernodes = self.0.elimination.supernodes(&factor.values);
         factor.sweeps.reserve(supernodes);
         factor.refactor(values)?;
         Ok(factor)
@@ -132,38 +121,18 @@ impl Pattern {
 impl Factor {
     /// Factors again with other values, in the memory of this factor. After an error the factor is of no use.
     pub fn refactor(&mut self, values: &[f64]) -> Result<(), FactorError> {
-        let Analysis {
-            n, lower, symbolic, ..
-        } = &*self.analysis;
-        let n = *n;
-        if values.len() != lower.slots.len() {
-            return Err(FactorError::WrongLength {
-                expected: lower.slots.len(),
-                found: values.len(),
-            });
+        let Analysis { n, elimination, .. } = &*self.analysis;
+        let (n, expected) = (*n, elimination.value_count());
+        if values.len() != expected {
+            let found = values.len();
+            return Err(FactorError::WrongLength { expected, found });
         }
-        let numbers = lower.gather(values);
-        let scratch = supernodal::factorize_supernodal_numeric_llt_scratch::<u32, f64>(
-            symbolic,
-            Par::Seq,
-            Default::default(),
-        );
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::TooLarge { n })?;
-        let factored = supernodal::factorize_supernodal_numeric_llt(
-            &mut self.values,
-            SparseColMatRef::new(lower.pattern(n), &numbers),
-            Default::default(),
-            symbolic,
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        );
-        clear_upper_halves();
-        if let Err(LltError::NonPositivePivot { index }) = factored {
-            return Err(FactorError::NotPositiveDefinite { pivot: index, n });
+        let factored = elimination.factor(values, &mut self.values);
+        if let Err(pivot) = factored.map_err(|_| FactorError::TooLarge { n })? {
+            return Err(FactorError::NotPositiveDefinite { pivot, n });
         }
         self.sweeps.clear();
-        for supernode in each_supernode(symbolic, &self.values) {
+        for supernode in elimination.supernodes(&self.values) {
             self.sweeps.push(supernode);
         }
         Ok(())
@@ -208,121 +177,12 @@ impl Factor {
     }
 }
 
-/// The supernodes of L with their values, in the order of elimination.
-fn each_supernode<'a>(
-    symbolic: &'a supernodal::SymbolicSupernodalCholesky<u32>,
-    values: &'a [f64],
-) -> impl Iterator<Item = Supernode<'a>> {
-    (0..symbolic.n_supernodes()).map(move |s| {
-        let first = symbolic.supernode_begin()[s] as usize;
-        let between = |starts: &[u32]| starts[s] as usize..starts[s + 1] as usize;
-        Supernode {
-            first,
-            columns: symbolic.supernode_end()[s] as usize - first,
-            pattern: &symbolic.row_idx()[between(symbolic.col_ptr_for_row_idx())],
-            values: &values[between(symbolic.col_ptr_for_val())],
-        }
-    })
-}
-
-/// Entries by columns, rows ascending.
-#[derive(Debug)]
-struct Compressed {
-    starts: Vec<u32>,
-    rows: Vec<u32>,
-    /// Where the value of each given entry goes.
-    slots: Vec<u32>,
-}
-
-impl Compressed {
-    /// Sorts entries [row, column] by columns and then by rows; equal ones share a slot. O(n + entries).
-    fn new(n: usize, entries: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let given = entries.zip(0..);
-        let by_rows = Buckets::new(n, given.map(|([row, column], e)| (row, [column, e])));
-        let sorted = Buckets::new(n, by_rows.iter().map(|(row, [c, e])| (c, [row, e])));
-        let mut starts = vec![0; n + 1];
-        let mut rows = Vec::with_capacity(sorted.items.len());
-        let mut slots = vec![0; sorted.items.len()];
-        for column in 0..n {
-            let mut before = None;
-            for &[row, e] in sorted.of(column) {
-                if before != Some(row) {
-                    rows.push(row);
-                    before = Some(row);
-                }
-                slots[e as usize] = rows.len() as u32 - 1;
-            }
-            starts[column + 1] = rows.len() as u32;
-        }
-        Self {
-            starts,
-            rows,
-            slots,
-        }
-    }
-
-    /// The entries [row, column], in order.
-    fn entries(&self) -> impl Iterator<Item = [u32; 2]> + Clone {
-        let columns = self.starts.windows(2).zip(0..);
-        columns.flat_map(|(range, column)| {
-            let rows = &self.rows[range[0] as usize..range[1] as usize];
-            rows.iter().map(move |&row| [row, column])
-        })
-    }
-
-    fn pattern(&self, n: usize) -> SymbolicSparseColMatRef<'_, u32> {
-        SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.rows)
-    }
-
-    fn gather(&self, values: &[f64]) -> Vec<f64> {
-        let mut gathered = vec![0.0; self.rows.len()];
-        for (&slot, value) in self.slots.iter().zip(values) {
-            gathered[slot as usize] += value;
-        }
-        gathered
-    }
-}
-
-/// Items by keys below n; those of one key keep their order.
-struct Buckets {
-    starts: Vec<u32>,
-    items: Vec<[u32; 2]>,
-}
-
-impl Buckets {
-    fn new(n: usize, keyed: impl Iterator<Item = (u32, [u32; 2])> + Clone) -> Self {
-        let mut starts = vec![0u32; n + 1];
-        for (key, _) in keyed.clone() {
-            starts[key as usize + 1] += 1;
-        }
-        for key in 0..n {
-            starts[key + 1] += starts[key];
-        }
-        let mut next = starts.clone();
-        let mut items = vec![[0; 2]; starts[n] as usize];
-        for (key, item) in keyed {
-            let place = &mut next[key as usize];
-            items[*place as usize] = item;
-            *place += 1;
-        }
-        Self { starts, items }
-    }
-
-    fn of(&self, key: usize) -> &[[u32; 2]] {
-        &self.items[self.starts[key] as usize..self.starts[key + 1] as usize]
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (u32, [u32; 2])> + Clone {
-        let keys = 0..self.starts.len() - 1;
-        keys.flat_map(|key| self.of(key).iter().map(move |&item| (key as u32, item)))
-    }
-}
-
 /// A fill-reducing order of the unknowns, and its inverse.
 fn minimum_degree(upper: &Compressed) -> Result<(Vec<u32>, Vec<u32>), FactorError> {
     let n = upper.starts.len() - 1;
     let (mut order, mut position) = (vec![0; n], vec![0; n]);
-    let mut memory = buffer(n, amd::order_scratch::<u32>(n, upper.rows.len()))?;
+    let scratch = amd::order_scratch::<u32>(n, upper.rows.len());
+    let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::TooLarge { n })?;
     amd::order(
         &mut order,
         &mut position,
@@ -332,37 +192,6 @@ fn minimum_degree(upper: &Compressed) -> Result<(Vec<u32>, Vec<u32>), FactorErro
     )
     .map_err(|_| FactorError::TooLarge { n })?;
     Ok((order, position))
-}
-
-/// The supernodes of L.
-fn supernodes(
-    upper: &Compressed,
-) -> Result<supernodal::SymbolicSupernodalCholesky<u32>, FactorError> {
-    let n = upper.starts.len() - 1;
-    let scratch = StackReq::any_of(&[
-        simplicial::prefactorize_symbolic_cholesky_scratch::<u32>(n, upper.rows.len()),
-        supernodal::factorize_supernodal_symbolic_cholesky_scratch::<u32>(n),
-    ]);
-    let mut memory = buffer(n, scratch)?;
-    let (mut tree, mut counts) = (vec![0; n], vec![0; n]);
-    let tree = simplicial::prefactorize_symbolic_cholesky::<u32>(
-        &mut tree,
-        &mut counts,
-        upper.pattern(n),
-        MemStack::new(&mut memory),
-    );
-    supernodal::factorize_supernodal_symbolic_cholesky(
-        upper.pattern(n),
-        tree,
-        &counts,
-        MemStack::new(&mut memory),
-        SymbolicSupernodalParams::default(),
-    )
-    .map_err(|_| FactorError::TooLarge { n })
-}
-
-fn buffer(n: usize, scratch: StackReq) -> Result<MemBuffer, FactorError> {
-    MemBuffer::try_new(scratch).map_err(|_| FactorError::TooLarge { n })
 }
 
 #[cfg(test)]
@@ -401,7 +230,7 @@ mod tests {
 
     #[test]
     fn grids_of_every_size() {
-        for side in 0..24 {
+        for side in (0..24).chain([110]) {
             let (n, entries, values) = grid(side);
             let factor = Pattern::new(n, &entries).unwrap().factor(&values).unwrap();
             let columns: [Vec<f64>; 3] =

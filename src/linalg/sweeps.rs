@@ -28,14 +28,29 @@ struct Panel {
     below: u32,
 }
 
-/// Columns of L from `first` on with one pattern: dense, column-major, a square block of their own rows (of which only the lower triangle is read) over
-/// the rows of `pattern`, which ascend.
+/// Columns of L from `first` on with one pattern: dense, column-major, a square block of their own rows (of which only the lower triangle is read, or
+/// where `packed` is all there is) over the rows of `pattern`, which ascend.
 #[derive(Clone, Copy, Debug)]
 pub struct Supernode<'a> {
     pub first: usize,
     pub columns: usize,
     pub pattern: &'a [u32],
     pub values: &'a [f64],
+    pub packed: bool,
+}
+
+impl<'a> Supernode<'a> {
+    /// Number of rows of the first column.
+    fn height(&self) -> usize {
+        self.columns + self.pattern.len()
+    }
+
+    /// A column from its diagonal on.
+    fn column(&self, w: usize) -> &'a [f64] {
+        let height = self.height();
+        let above = if self.packed { triangle(w) } else { 0 };
+        &self.values[w * (height + 1) - above..][..height - w]
+    }
 }
 
 impl Sweeps {
@@ -50,7 +65,7 @@ impl Sweeps {
     pub fn reserve<'a>(&mut self, supernodes: impl Iterator<Item = Supernode<'a>>) {
         let (mut panels, mut rows, mut values) = (0, 0, 0);
         for supernode in supernodes {
-            let height = supernode.columns + supernode.pattern.len();
+            let height = supernode.height();
             for first in (0..supernode.columns).step_by(WIDTH) {
                 let width = WIDTH.min(supernode.columns - first);
                 let below = height - first - width;
@@ -77,19 +92,20 @@ impl Sweeps {
     }
 
     fn push_panel<const W: usize>(&mut self, supernode: Supernode, first: usize) {
-        let height = supernode.columns + supernode.pattern.len();
-        let columns: [&[f64]; W] =
-            std::array::from_fn(|w| &supernode.values[(first + w) * height..][..height]);
-        self.push_triangle(columns.map(|column| &column[first..first + W]));
+        let columns: [&[f64]; W] = std::array::from_fn(|w| supernode.column(first + w));
+        self.push_triangle(columns);
         let before = self.rows.len();
         let own = (first + W..supernode.columns).map(|i| (supernode.first + i) as u32);
         let rows = own.chain(supernode.pattern.iter().copied());
-        let below = columns.map(|column| &column[first + W..]);
+        let below: [&[f64]; W] = std::array::from_fn(|w| &columns[w][W - w..]);
         for (i, row) in rows.enumerate() {
-            let entries = below.map(|column| column[i]);
+            let mut entries = [0.0; W];
+            for w in 0..W {
+                entries[w] = -below[w][i];
+            }
             if entries != [0.0; W] {
                 self.rows.push(row);
-                self.values.extend(entries.map(|entry| -entry));
+                self.values.extend(entries);
             }
         }
         self.panels.push(Panel {
@@ -99,13 +115,13 @@ impl Sweeps {
         });
     }
 
-    /// Appends the inverse of a lower triangle, given by columns.
+    /// Appends the inverse of a lower triangle, given by columns from the diagonal on.
     fn push_triangle<const W: usize>(&mut self, columns: [&[f64]; W]) {
         let mut inverse = [[0.0; W]; W];
         for i in 0..W {
-            let pivot = 1.0 / columns[i][i];
+            let pivot = 1.0 / columns[i][0];
             for j in 0..i {
-                let known: f64 = (j..i).map(|k| columns[k][i] * inverse[k][j]).sum();
+                let known: f64 = (j..i).map(|k| columns[k][i - k] * inverse[k][j]).sum();
                 inverse[i][j] = -known * pivot;
             }
             inverse[i][i] = pivot;

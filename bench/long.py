@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Error, time and peak memory of signals as a sequence grows: in windows and whole. Python's standard library only.
 
-    bench/long/measure.py OUT [--frames 100,500,...] [--repeat R] [--whole-up-to N] [--limit SECONDS]
+    bench/long.py OUT [--frames 100,500,...] [--repeat R] [--whole-up-to N] [--limit SECONDS]
 
 Every fit and every sampling is a process of its own; its time on all processors and its peak resident memory are what the operating system counted
 (wait4: ru_utime + ru_stime, ru_maxrss), and wall time stands beside them. Of R runs the median times and the greatest memory are kept. What takes more
@@ -12,16 +12,16 @@ import csv
 import json
 import os
 import pathlib
-import platform
 import resource
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
 
-HOME = pathlib.Path(__file__).resolve().parents[2]
+from machine import machine
+
+HOME = pathlib.Path(__file__).resolve().parents[1]
 PROGRAM = HOME / "target/release/meshseq"
 
 
@@ -86,23 +86,6 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def machine():
-    info = pathlib.Path("/proc/cpuinfo").read_text() if pathlib.Path("/proc/cpuinfo").exists() else ""
-    names = [line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name")]
-    git = ["git", "-C", str(HOME)]
-    revision = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True).stdout.strip()
-    dirty = subprocess.run([*git, "status", "--porcelain", "-uno"], capture_output=True, text=True).stdout.strip()
-    return "\n".join([
-        f"processor: {names[0] if names else platform.processor()}",
-        f"threads: {os.cpu_count()}",
-        f"memory: {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') // 1024} kB",
-        f"system: {platform.release()}",
-        f"load: {' '.join(f'{x:.2f}' for x in os.getloadavg())}",
-        f"revision: {revision}{' and changes' if dirty else ''}",
-        f"time: {time.strftime('%Y-%m-%dT%H:%M:%SZ', time.gmtime())}",
-    ]) + "\n"  # fmt: skip
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=pathlib.Path)
@@ -116,7 +99,7 @@ def main():
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "machine.txt").write_text(machine())
-    (options.out / "command.txt").write_text(" ".join(["bench/long/measure.py", *sys.argv[1:]]) + "\n")
+    (options.out / "command.txt").write_text(" ".join(["bench/long.py", *sys.argv[1:]]) + "\n")
     folder = pathlib.Path(tempfile.mkdtemp())
     try:
         with open(options.out / "table.csv", "w", newline="") as file:
