@@ -1,5 +1,7 @@
 //! Figure 7: a gallop moved to another animal by eight examples, in two shape spaces.
 
+use faer::MatRef;
+
 use super::render::{MARKED, PLAIN, View};
 use super::signals::poses;
 use super::{Exhibit, ExhibitError, Panel, Table};
@@ -150,7 +152,8 @@ fn example_error(given: &Given, from: &dyn Space, to: &dyn Space) -> Result<f64,
         .map_err(ExhibitError::of(NAME))?;
     let moved = frames_of_coordinates(x.as_ref(), r.as_ref());
     let moved = moved.map_err(ExhibitError::of(NAME))?;
-    let frames = decode_all(to, moved.as_ref()).map_err(ExhibitError::of(NAME))?;
+    let moved = MatRef::from_column_major_slice(&moved, r.nrows(), x.ncols());
+    let frames = decode_all(to, moved).map_err(ExhibitError::of(NAME))?;
     let gaps = frames
         .iter()
         .zip(given.target.positions())

@@ -98,9 +98,11 @@ impl ExampleBasis {
     pub fn missed(&self, frames: MatRef<'_, f64>) -> Result<f64, TransferError> {
         let x = self.coordinates(frames)?;
         let (d, n) = frames.shape();
-        let mean: Vec<f64> = (0..d)
-            .map(|a| frames.row(a).iter().sum::<f64>() / n as f64)
-            .collect();
+        let mut mean = vec![0.0; d];
+        for frame in frames.col_iter() {
+            mean.iter_mut().zip(frame.iter()).for_each(|(m, z)| *m += z);
+        }
+        mean.iter_mut().for_each(|m| *m /= n as f64);
         let sums: Vec<[f64; 2]> = (0..n)
             .into_par_iter()
             .map(|i| {
@@ -232,25 +234,37 @@ pub fn replace_shape(
     })
 }
 
-/// W = r_0 + sum_j x_j (r_j - r_0) for coordinates X (m x n), d' x n: transfer of frames, with signals that interpolate.
+/// Rows of examples that are combined for all frames before the next: those of some examples stay in a core's cache.
+const ROWS: usize = 1024;
+/// Frames written by one task.
+const FRAMES: usize = 16;
+
+/// W = r_0 + sum_j x_j (r_j - r_0) for coordinates X (m x n), d' numbers a frame, frame after frame: transfer of frames, with signals that interpolate.
+/// O(d' m n), and each of the numbers is written once.
 pub fn frames_of_coordinates(
     coordinates: MatRef<'_, f64>,
     target: MatRef<'_, f64>,
-) -> Result<Mat<f64>, TransferError> {
+) -> Result<Vec<f64>, TransferError> {
     let (offset, basis) = differences(target)?;
     paired(coordinates.nrows() + 1, target.ncols())?;
-    let columns: Vec<Vec<f64>> = (0..coordinates.ncols())
-        .into_par_iter()
-        .map(|i| {
-            let x: Vec<f64> = coordinates.col(i).iter().copied().collect();
-            let mut frame = offset.clone();
-            combine(&x, |j| basis.col_as_slice(j), &mut frame);
-            frame
-        })
+    let d = offset.len();
+    let weights: Vec<Vec<f64>> = coordinates
+        .col_iter()
+        .map(|x| x.iter().copied().collect())
         .collect();
-    Ok(Mat::from_fn(offset.len(), columns.len(), |a, i| {
-        columns[i][a]
-    }))
+    let mut frames = vec![0.0; d * weights.len()];
+    let tasks = frames.par_chunks_mut(d * FRAMES);
+    tasks.zip(weights.par_chunks(FRAMES)).for_each(|(w, x)| {
+        for first in (0..d).step_by(ROWS) {
+            let rows = first..(first + ROWS).min(d);
+            for (frame, x) in w.chunks_exact_mut(d).zip(x) {
+                let frame = &mut frame[rows.clone()];
+                frame.copy_from_slice(&offset[rows.clone()]);
+                combine(x, |j| &basis.col_as_slice(j)[rows.clone()], frame);
+            }
+        }
+    });
+    Ok(frames)
 }
 
 /// A motion (n x 3V positions) on another mesh: its signals, k control points and l sites, fitted over examples of its own mesh, and then over those of
@@ -351,6 +365,7 @@ mod tests {
         let other = replace_shape(over, r.as_ref()).unwrap();
         let x = basis.coordinates(z.as_ref()).unwrap();
         let w = frames_of_coordinates(x.as_ref(), r.as_ref()).unwrap();
+        let w = MatRef::from_column_major_slice(&w, 9, 12);
         assert!((at_frames(&other) - w).norm_max() < 1e-8);
     }
 

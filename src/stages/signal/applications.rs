@@ -36,6 +36,7 @@ pub fn transfer(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let frames = inputs.matrix("Z")?;
     let source = inputs.matrix("Q")?;
     let target = inputs.matrix("R")?;
+    let target_rows = target.nrows();
     call(
         move || {
             let basis = ExampleBasis::new(source.as_ref()).map_err(StageError::from_error)?;
@@ -44,10 +45,10 @@ pub fn transfer(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
             let moved = frames_of_coordinates(x.as_ref(), target.as_ref());
             Ok((x, moved.map_err(StageError::from_error)?))
         },
-        |(x, moved)| {
+        move |(x, moved)| {
             Bundle::from([
                 ("X", Array::columns(x.as_ref())),
-                ("W", Array::columns(moved.as_ref())),
+                ("W", frames_array([x.ncols(), target_rows], moved)),
             ])
         },
     )
