@@ -102,10 +102,13 @@ pub fn thin_svd(a: MatRef<'_, f64>) -> Result<ThinSvd, FactorError> {
     let size = rows.min(columns);
     let (mut u, mut v) = (Mat::zeros(rows, size), Mat::zeros(columns, size));
     let mut s = Diag::<f64>::zeros(size);
+    let lift = lift(a);
+    let mut a = a.to_owned();
+    scale_by(a.as_mut(), lift);
     let thin = svd::ComputeSvdVectors::Thin;
     let scratch = svd::svd_scratch::<f64>(rows, columns, thin, thin, Par::Seq, Default::default());
     svd::svd(
-        a,
+        a.as_ref(),
         s.as_mut(),
         Some(u.as_mut()),
         Some(v.as_mut()),
@@ -120,7 +123,7 @@ pub fn thin_svd(a: MatRef<'_, f64>) -> Result<ThinSvd, FactorError> {
     })?;
     Ok(ThinSvd {
         u,
-        s: s.column_vector().iter().copied().collect(),
+        s: s.column_vector().iter().map(|s| s / lift).collect(),
         v,
     })
 }

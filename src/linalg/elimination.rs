@@ -17,9 +17,14 @@ use super::sweeps::Supernode;
 /// From so many multiplications a number of L on, blocks are used: as CHOLMOD decides it.
 const BLOCKS_PAY: f64 = 40.0;
 
-/// No memory for the factor, or no indices.
+/// Why there is no factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooLarge;
+pub enum Unfactored {
+    /// No memory for it, or no indices.
+    TooLarge,
+    /// The pivot, in the order of elimination, that is not positive.
+    NotPositive { pivot: usize },
+}
 
 /// Where L has entries, and how its numbers are found.
 #[derive(Debug)]
@@ -39,7 +44,7 @@ enum Way {
 
 impl Elimination {
     /// Of a matrix with this upper triangle.
-    pub fn new(upper: Compressed) -> Result<Self, TooLarge> {
+    pub fn new(upper: Compressed) -> Result<Self, Unfactored> {
         let n = upper.starts.len() - 1;
         let scratch = StackReq::any_of(&[
             simplicial::prefactorize_symbolic_cholesky_scratch::<u32>(n, upper.rows.len()),
@@ -60,7 +65,7 @@ impl Elimination {
         if sum(|count| count * count) < BLOCKS_PAY * sum(|count| count) {
             let symbolic =
                 simplicial::factorize_simplicial_symbolic_cholesky(pattern, tree, &counts, stack)
-                    .map_err(|_| TooLarge)?;
+                    .map_err(|_| Unfactored::TooLarge)?;
             let runs = runs(symbolic.col_ptr(), symbolic.row_idx());
             return Ok(Self {
                 matrix: upper,
@@ -75,7 +80,7 @@ impl Elimination {
             SymbolicSupernodalParams::default(),
         );
         Ok(Self {
-            way: Way::Blocks(symbolic.map_err(|_| TooLarge)?),
+            way: Way::Blocks(symbolic.map_err(|_| Unfactored::TooLarge)?),
             matrix: upper.transpose(),
         })
     }
@@ -93,8 +98,8 @@ impl Elimination {
         self.matrix.slots.len()
     }
 
-    /// Writes L; the pivot that is not positive is the error's.
-    pub fn factor(&self, values: &[f64], l: &mut [f64]) -> Result<Result<(), usize>, TooLarge> {
+    /// Writes L.
+    pub fn factor(&self, values: &[f64], l: &mut [f64]) -> Result<(), Unfactored> {
         let n = self.matrix.starts.len() - 1;
         let numbers = self.matrix.gather(values);
         let a = SparseColMatRef::new(self.matrix.pattern(n), &numbers);
@@ -127,11 +132,11 @@ impl Elimination {
             }
         };
         clear_upper_halves();
-        let LltError::NonPositivePivot { index } = match factored {
-            Ok(_) => return Ok(Ok(())),
-            Err(error) => error,
-        };
-        Ok(Err(index))
+        factored
+            .map(|_| ())
+            .map_err(
+                |LltError::NonPositivePivot { index: pivot }| Unfactored::NotPositive { pivot },
+            )
     }
 
     /// The runs of columns of L with one pattern, in the order of elimination.
@@ -177,6 +182,6 @@ fn runs(starts: &[u32], rows: &[u32]) -> Vec<u32> {
     begins.chain([n]).map(|j| j as u32).collect()
 }
 
-fn buffer(scratch: StackReq) -> Result<MemBuffer, TooLarge> {
-    MemBuffer::try_new(scratch).map_err(|_| TooLarge)
+fn buffer(scratch: StackReq) -> Result<MemBuffer, Unfactored> {
+    MemBuffer::try_new(scratch).map_err(|_| Unfactored::TooLarge)
 }

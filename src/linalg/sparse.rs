@@ -10,7 +10,7 @@ use faer::sparse::linalg::amd;
 use thiserror::Error;
 
 use super::compressed::Compressed;
-use super::elimination::Elimination;
+use super::elimination::{Elimination, Unfactored};
 use super::sweeps::Sweeps;
 
 /// Why a sparse system has no factor.
@@ -40,6 +40,15 @@ pub enum FactorError {
         "the factor of this {n} x {n} sparse matrix does not fit in memory or in 32-bit indices"
     )]
     TooLarge { n: usize },
+}
+
+impl FactorError {
+    fn of(error: Unfactored, n: usize) -> Self {
+        match error {
+            Unfactored::TooLarge => Self::TooLarge { n },
+            Unfactored::NotPositive { pivot } => Self::NotPositiveDefinite { pivot, n },
+        }
+    }
 }
 
 /// Where a symmetric matrix has entries, analysed.
@@ -90,7 +99,7 @@ impl Pattern {
         Ok(Self(Arc::new(Analysis {
             n,
             order,
-            elimination: elimination.map_err(|_| FactorError::TooLarge { n })?,
+            elimination: elimination.map_err(|e| FactorError::of(e, n))?,
         })))
     }
 
@@ -128,9 +137,7 @@ impl Factor {
             return Err(FactorError::WrongLength { expected, found });
         }
         let factored = elimination.factor(values, &mut self.values);
-        if let Err(pivot) = factored.map_err(|_| FactorError::TooLarge { n })? {
-            return Err(FactorError::NotPositiveDefinite { pivot, n });
-        }
+        factored.map_err(|e| FactorError::of(e, n))?;
         self.sweeps.clear();
         for supernode in elimination.supernodes(&self.values) {
             self.sweeps.push(supernode);

@@ -79,7 +79,7 @@ pub fn design(
     let count = options.sites.unwrap_or(all);
     let sites = match count == all {
         true => (0..all).collect(),
-        false => site_order(places, x, count, &vec![true; all])?.order,
+        false => site_order(places, x, count, &vec![true; all], &[])?.order,
     };
     Ok(Representation {
         time: time_signal(&Sketch::new(sketch, options.closed)?, options),

@@ -378,8 +378,11 @@ impl Base {
     }
 
     fn order_among(&self, count: usize, candidates: &[bool]) -> Result<SiteOrder, FactorError> {
-        let x = self.shape.coordinates.as_ref();
-        site_order(&self.plane().positions, x, count, candidates)
+        let (plane, x) = (self.plane(), self.shape.coordinates.as_ref());
+        // g is least held at the ends of a motion. The paper's layout has the paper's order.
+        let ends = [0, x.ncols() - 1];
+        let first = if plane.weight > 0.0 { &ends[..] } else { &[] };
+        site_order(&plane.positions, x, count, candidates, first)
     }
 
     pub(super) fn fit(mut self, k: usize, l: usize, rule: KnotRule) -> Result<Fit, FitError> {

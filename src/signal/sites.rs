@@ -28,7 +28,8 @@ pub struct SiteOrder {
 /// the sites so far.
 ///
 /// `points` are the n pose-space positions and `coordinates` (m x n) the shape coordinates. Frames that are no `candidates` wait until all
-/// candidates are chosen (reading 10); a frame at the same place as a chosen site is never chosen. Ties go to the lower index (reading 5).
+/// candidates are chosen (reading 10); a frame at the same place as a chosen site is never chosen. Ties go to the lower index (reading 5). Candidates that
+/// are `first` come before all others, which the paper has not.
 ///
 /// The fits are one QR that grows by a column a site: the spaces are nested once the side conditions are met by subtracting, from each site's
 /// kernel, the kernels of three fixed sites with the site's barycentric weights. O(n^2) kernels, then O(n (l + m)) a site.
@@ -37,9 +38,13 @@ pub fn site_order(
     coordinates: MatRef<'_, f64>,
     count: usize,
     candidates: &[bool],
+    first: &[usize],
 ) -> Result<SiteOrder, FactorError> {
     let mut search = Search::new(points, coordinates, candidates);
-    let distances = plane_distances(coordinates)?;
+    let mut distances = plane_distances(coordinates)?;
+    for &frame in first {
+        distances[frame] = f64::INFINITY;
+    }
     for _ in 0..count.min(4) {
         let Some(next) = search.farthest(&distances) else {
             break;
@@ -297,7 +302,7 @@ mod tests {
     #[test]
     fn errors_are_those_of_fresh_fits_and_the_choice_is_the_worst_frame() {
         let (points, x) = sample(25);
-        let found = site_order(&points, x.as_ref(), 25, &[true; 25]).unwrap();
+        let found = site_order(&points, x.as_ref(), 25, &[true; 25], &[]).unwrap();
         assert_eq!(found.order.len(), 25);
         for l in 3..25 {
             let g = PoseSignal::fit(&points, x.as_ref(), &found.order[..l]).unwrap();
@@ -332,7 +337,7 @@ mod tests {
                 x[(a, i)] = x[(a, i - 10)];
             }
         }
-        let found = site_order(&points, x.as_ref(), 20, &[true; 20]).unwrap();
+        let found = site_order(&points, x.as_ref(), 20, &[true; 20], &[]).unwrap();
         assert_eq!(found.order.len(), 10);
         assert!(found.order.iter().all(|&i| i < 10));
     }
@@ -341,9 +346,20 @@ mod tests {
     fn candidates_come_first_and_the_others_after_them() {
         let (points, x) = sample(12);
         let candidates: Vec<bool> = (0..12).map(|i| i % 3 != 0).collect();
-        let found = site_order(&points, x.as_ref(), 12, &candidates).unwrap();
+        let found = site_order(&points, x.as_ref(), 12, &candidates, &[]).unwrap();
         assert!(found.order[..8].iter().all(|i| i % 3 != 0));
         assert!(found.order[8..].iter().all(|i| i % 3 == 0));
+    }
+
+    #[test]
+    fn the_first_come_first_where_they_are_candidates() {
+        let (points, x) = sample(12);
+        let given = site_order(&points, x.as_ref(), 12, &[true; 12], &[]).unwrap();
+        let last = given.order[11];
+        let candidates: Vec<bool> = (0..12).map(|i| i != given.order[10]).collect();
+        let first = [last, given.order[10]];
+        let found = site_order(&points, x.as_ref(), 12, &candidates, &first).unwrap();
+        assert_eq!([found.order[0], found.order[11]], first);
     }
 
     #[test]
@@ -351,15 +367,15 @@ mod tests {
         let x = sample(8).1;
         let line: Vec<Point> = (0..8).map(|i| [i as f64, 0.0]).collect();
         assert_eq!(
-            site_order(&line, x.as_ref(), 8, &[true; 8])
+            site_order(&line, x.as_ref(), 8, &[true; 8], &[])
                 .unwrap()
                 .order
                 .len(),
             8
         );
-        let one = site_order(&[[2.0, 1.0]; 8], x.as_ref(), 8, &[true; 8]).unwrap();
+        let one = site_order(&[[2.0, 1.0]; 8], x.as_ref(), 8, &[true; 8], &[]).unwrap();
         assert_eq!(one.order.len(), 1);
-        let none = site_order(&line, Mat::zeros(0, 8).as_ref(), 8, &[true; 8]).unwrap();
+        let none = site_order(&line, Mat::zeros(0, 8).as_ref(), 8, &[true; 8], &[]).unwrap();
         assert_eq!(none.order, [0, 1, 2, 3, 4, 5, 6, 7]);
     }
 }

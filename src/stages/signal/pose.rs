@@ -98,7 +98,7 @@ pub fn sites(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     call(
         move || {
             let all = vec![true; points.len()];
-            site_order(&points, x.as_ref(), count, &all).map_err(StageError::from_error)
+            site_order(&points, x.as_ref(), count, &all, &[]).map_err(StageError::from_error)
         },
         |found| {
             Bundle::from([
