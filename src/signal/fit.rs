@@ -380,7 +380,7 @@ impl Base {
     fn order_among(&self, count: usize, candidates: &[bool]) -> Result<SiteOrder, FactorError> {
         let (plane, x) = (self.plane(), self.shape.coordinates.as_ref());
         // g is least held at the ends of a motion. The paper's layout has the paper's order.
-        let ends = [0, x.ncols() - 1];
+        let ends = [0, x.ncols().saturating_sub(1)];
         let first = if plane.weight > 0.0 { &ends[..] } else { &[] };
         site_order(&plane.positions, x, count, candidates, first)
     }

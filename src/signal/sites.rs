@@ -43,7 +43,9 @@ pub fn site_order(
     let mut search = Search::new(points, coordinates, candidates);
     let mut distances = plane_distances(coordinates)?;
     for &frame in first {
-        distances[frame] = f64::INFINITY;
+        if let Some(distance) = distances.get_mut(frame) {
+            *distance = f64::INFINITY;
+        }
     }
     for _ in 0..count.min(4) {
         let Some(next) = search.farthest(&distances) else {
