@@ -15,7 +15,7 @@ const MOST_BATCH: f64 = 2000.0;
 /// All rounds of one engine on one case last about this long.
 const BUDGET_SECONDS: f64 = 2.0;
 const ROUNDS: (usize, usize) = (3, 25);
-/// An engine whose call takes longer is asked in the first round only.
+/// An engine whose call takes longer has one sample, from before the first round.
 const SLOW_SECONDS: f64 = 4.0;
 
 /// Times the engines of these places in the list (those that agree) on a case. Every round asks each once; each answers after a warm-up call where that
@@ -43,7 +43,7 @@ pub fn measure(
                 batch,
                 warm: seconds < 0.1,
                 pilot: seconds,
-                seconds: Vec::new(),
+                seconds: Vec::from_iter((seconds > SLOW_SECONDS).then_some(seconds)),
             });
         }
     }
@@ -53,10 +53,10 @@ pub fn measure(
         .map(|r| r.pilot * r.batch as f64)
         .fold(1e-6, f64::max);
     let rounds = ((BUDGET_SECONDS / slowest) as usize).clamp(ROUNDS.0, ROUNDS.1);
-    for round in 0..rounds {
+    for _ in 0..rounds {
         // An engine that fails now is asked no more and has no time.
         runs.retain_mut(|run| {
-            if round > 0 && run.slow() {
+            if run.slow() {
                 return true;
             }
             let seconds = timed(engines[run.place].as_mut(), run.batch, run.warm);
