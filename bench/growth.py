@@ -56,7 +56,8 @@ def main():
         stamp.write_text("")
         since = stamp.stat().st_mtime
         for bench in options.bench.split(","):
-            command = ["cargo", "bench", "--locked", "--bench", bench, "--", *([options.filter] if options.filter else [])]
+            chosen = [options.filter] if options.filter else []
+            command = ["cargo", "bench", "--locked", "--bench", bench, "--", "--warm-up-time", "1", *chosen]
             if subprocess.run(command, cwd=HOME).returncode != 0:
                 sys.exit(f"failed: {' '.join(command)}")
     options.out.mkdir(parents=True, exist_ok=True)

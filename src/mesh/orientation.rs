@@ -197,10 +197,9 @@ mod tests {
         }
     }
 
-    /// A sheet folded over along a crease: the half that is laid over is no more inside out than the other, and beside the crease, where a neighbourhood
-    /// has both halves, no face is turned for certain.
+    /// A sheet folded over along a crease: the half that is laid over is no more inside out than the other.
     #[test]
-    fn a_fold_turns_nothing_for_certain() {
+    fn only_faces_beside_a_fold_are_in_doubt() {
         let (rest, faces) = sheet(8);
         let orientation = Orientation::new(&rest, &faces);
         let folded = mapped(&rest, |[x, y, z]| match x > 3.5 {
