@@ -123,9 +123,11 @@ fn sites_and_rbf(c: &mut Criterion) {
         let (x, p) = poses(n, 20.min(n - 1));
         let all = vec![true; n];
         group.bench_function(BenchmarkId::new("whole greedy order, frames", n), |b| {
-            b.iter(|| site_order(&p, x.as_ref(), n, &all).unwrap());
+            b.iter(|| site_order(&p, x.as_ref(), n, &all, &[]).unwrap());
         });
-        let sites = site_order(&p, x.as_ref(), n * 7 / 10, &all).unwrap().order;
+        let sites = site_order(&p, x.as_ref(), n * 7 / 10, &all, &[])
+            .unwrap()
+            .order;
         group.bench_function(
             BenchmarkId::new("one approximation with 0.7 n sites, frames", n),
             |b| {
@@ -137,7 +139,7 @@ fn sites_and_rbf(c: &mut Criterion) {
         let (x, p) = poses(204, m);
         let all = vec![true; 204];
         group.bench_function(BenchmarkId::new("whole greedy order, m", m), |b| {
-            b.iter(|| site_order(&p, x.as_ref(), 204, &all).unwrap());
+            b.iter(|| site_order(&p, x.as_ref(), 204, &all, &[]).unwrap());
         });
     }
 }
