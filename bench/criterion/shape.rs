@@ -8,7 +8,7 @@ use meshseq::shape::{Space, SpaceKind, prepare_for};
 
 /// Faces of the meshes: some from a thousand to a million.
 const FACES: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
-/// Of the mesh that is decoded by a nonlinear descent.
+/// Faces of the largest mesh that is decoded by a nonlinear descent.
 const MOST_NONLINEAR: usize = 10_000;
 
 /// A wavy square sheet of about this many triangles, and the sheet with its waves moved on and turned over.

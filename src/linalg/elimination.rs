@@ -43,7 +43,7 @@ enum Way {
 }
 
 impl Elimination {
-    /// Of a matrix with this upper triangle.
+    /// Of a matrix with this upper triangle, n x n. An error where the factor does not fit in memory.
     pub fn new(upper: Compressed) -> Result<Self, Unfactored> {
         let n = upper.starts.len() - 1;
         let scratch = StackReq::any_of(&[
@@ -98,7 +98,7 @@ impl Elimination {
         self.matrix.slots.len()
     }
 
-    /// Writes L.
+    /// Writes L, `factor_len` numbers, for values in the order of the entries that the matrix was compressed from.
     pub fn factor(&self, values: &[f64], l: &mut [f64]) -> Result<(), Unfactored> {
         let n = self.matrix.starts.len() - 1;
         let numbers = self.matrix.gather(values);

@@ -28,8 +28,8 @@ pub struct SiteOrder {
 /// the sites so far.
 ///
 /// `points` are the n pose-space positions and `coordinates` (m x n) the shape coordinates. Frames that are no `candidates` wait until all
-/// candidates are chosen (reading 10); a frame at the same place as a chosen site is never chosen. Ties go to the lower index (reading 5). Candidates that
-/// are `first` come before all others, which the paper has not.
+/// candidates are chosen (reading 10); a frame at the same place as a chosen site is never chosen. Ties go to the lower index (reading 5). Up to four
+/// candidates that are `first` (0-based frames, by their index) come before all others, which the paper has not; those that are not there are passed over.
 ///
 /// The fits are one QR that grows by a column a site: the spaces are nested once the side conditions are met by subtracting, from each site's
 /// kernel, the kernels of three fixed sites with the site's barycentric weights. O(n^2) kernels, then O(n (l + m)) a site.
