@@ -3,7 +3,7 @@
 // rotations `iterations` times; at the last, until `iterations` of them move no vertex by more than `still` of the diagonal, `most` at most, as such
 // alternations end slowly. CGAL's own test, of the energy, ends much earlier.
 //
-// What it has not got is said: components without a handle, degenerate triangles (their cotangents are infinite), and surfaces that are no oriented
+// What it has not got is said: components without a handle, degenerate triangles (their cotangents have no bound), and surfaces that are no oriented
 // manifolds.
 
 #define CGAL_EIGEN3_ENABLED  // the default solver and the default rotations
@@ -138,8 +138,8 @@ static Mesh build(const wire::Reals& positions, const wire::Integers& faces) {
         triangles.push_back({std::size_t(faces[f]), std::size_t(faces[f + 1]), std::size_t(faces[f + 2])});
         const Point &a = points[faces[f]], &b = points[faces[f + 1]], &c = points[faces[f + 2]];
         const double longest = std::max({CGAL::squared_distance(a, b), CGAL::squared_distance(b, c), CGAL::squared_distance(c, a)});
-        if (2 * std::sqrt(CGAL::squared_area(a, b, c)) <= 1e-10 * longest)
-            throw wire::Unsupported("a triangle of start is degenerate: its cotangents are infinite");
+        if (2 * std::sqrt(CGAL::squared_area(a, b, c)) <= 1e-5 * longest)
+            throw wire::Unsupported("a triangle of start is degenerate: its cotangents have no bound");
     }
     namespace PMP = CGAL::Polygon_mesh_processing;
     if (!PMP::is_polygon_soup_a_polygon_mesh(triangles)) throw wire::Unsupported("CGAL's mesh cannot hold a surface that is no oriented manifold");

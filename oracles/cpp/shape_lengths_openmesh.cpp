@@ -1,4 +1,5 @@
-// Stage shape.lengths_encode by OpenMesh: calc_edge_length and calc_dihedral_angle over its half-edges. Eigen takes a component's rotation apart.
+// Stage shape.lengths_encode by OpenMesh: calc_edge_length and calc_dihedral_angle over its half-edges. Eigen takes the rotations of
+// components and parts apart.
 //
 // `seconds` is the work on the frames: the half-edges depend on the faces alone and are built before.
 //
@@ -30,7 +31,7 @@ using Eigen::Matrix3d;
 static bool is_degenerate(const Mesh& mesh, Mesh::FaceHandle face) {
     double longest = 0;
     for (const auto edge : mesh.fe_range(face)) longest = std::max(longest, mesh.calc_edge_sqr_length(edge));
-    return 2 * mesh.calc_sector_area(mesh.halfedge_handle(face)) <= 1e-10 * longest;
+    return 2 * mesh.calc_sector_area(mesh.halfedge_handle(face)) <= 1e-5 * longest;
 }
 
 // Components of vertices joined by solid triangles, numbered by lowest vertex.
@@ -61,6 +62,33 @@ struct Components {
     }
 };
 
+// The lowest triangles of further parts, ascending: of the parts that edges between solid triangles join, those without a component's root.
+static std::vector<int> further_parts(const Mesh& mesh, const std::vector<char>& solid, const std::vector<int>& roots) {
+    std::vector<char> seen(solid.size(), 0);
+    auto pass_over = [&](int first) {
+        std::vector<Mesh::FaceHandle> next{Mesh::FaceHandle(first)};
+        seen[first] = 1;
+        while (!next.empty()) {
+            const auto face = next.back();
+            next.pop_back();
+            for (const auto across : mesh.ff_range(face))
+                if (solid[across.idx()] && !seen[across.idx()]) {
+                    seen[across.idx()] = 1;
+                    next.push_back(across);
+                }
+        }
+    };
+    for (const int root : roots)
+        if (root >= 0) pass_over(root);
+    std::vector<int> further;
+    for (std::size_t f = 0; f < solid.size(); ++f)
+        if (solid[f] && !seen[f]) {
+            further.push_back(int(f));
+            pass_over(int(f));
+        }
+    return further;
+}
+
 class Encoder {
 public:
     Encoder(const wire::Reals& reference, const wire::Integers& faces) {
@@ -73,6 +101,7 @@ public:
         }
         for (const auto face : mesh_.faces()) solid_.push_back(!is_degenerate(mesh_, face));
         components_ = std::make_unique<Components>(mesh_, solid_);
+        further_ = further_parts(mesh_, solid_, components_->root);
 
         for (const auto edge : mesh_.edges()) edges_.push_back(edge);
         auto ends = [&](Mesh::EdgeHandle edge) {
@@ -82,18 +111,20 @@ public:
         };
         std::sort(edges_.begin(), edges_.end(), [&](auto a, auto b) { return ends(a) < ends(b); });
         for (const auto edge : edges_) unit_ += mesh_.calc_edge_length(edge) / double(edges_.size());
-        for (const int root : components_->root) inverse_.push_back(root < 0 ? Matrix3d::Identity() : Matrix3d(trihedron(root).inverse()));
+        inverse_.resize(corners_.size());
+        for (const int root : components_->root)
+            if (root >= 0) inverse_[root] = trihedron(root).inverse();
+        for (const int root : further_) inverse_[root] = trihedron(root).inverse();
         diagonal_ = diagonal();
         if (diagonal_ == 0) throw std::invalid_argument("the reference has no extent");
     }
 
-    std::size_t size() const { return 2 * edges_.size() + 6 * components_->root.size(); }
+    std::size_t size() const { return 2 * edges_.size() + 6 * components_->root.size() + 3 * further_.size(); }
 
     void encode(const double* frame, double* z) {
         for (const auto vertex : mesh_.vertices()) mesh_.set_point(vertex, Mesh::Point(frame + 3 * vertex.idx()));
         for (const auto face : mesh_.faces())
-            if (solid_[face.idx()] && is_degenerate(mesh_, face))
-                throw wire::Unsupported("a frame has a degenerate triangle, without a normal, that is not degenerate in the reference");
+            if (solid_[face.idx()] && has_collapsed(face.idx())) throw wire::Unsupported("a frame collapses a triangle to a line: it has no normal here");
         for (const auto edge : edges_) {
             *z++ = mesh_.calc_edge_length(edge) / unit_;
             *z++ = has_angle(edge) ? mesh_.calc_dihedral_angle(edge) : 0;
@@ -108,14 +139,37 @@ private:
         return solid(0) && solid(1);
     }
 
-    // [e1 e2 n], n of unit length: from triangle to triangle this maps plane to plane, and normal to normal.
-    Matrix3d trihedron(int face) const {
+    // Of corners a, b, c as given: [e1 e2 e1 x e2].
+    Matrix3d sides(int face) const {
         const auto [a, b, c] = corners_[face];
         auto point = [&](int v) { return Eigen::Map<const Eigen::Vector3d>(mesh_.point(Mesh::VertexHandle(v)).data()); };
         const Eigen::Vector3d e1 = point(b) - point(a), e2 = point(c) - point(a);
         Matrix3d columns;
-        columns << e1, e2, e1.cross(e2).normalized();
+        columns << e1, e2, e1.cross(e2);
         return columns;
+    }
+
+    bool has_collapsed(int face) const {
+        const Matrix3d of = sides(face);
+        return of.col(2).norm() <= 1e-14 * of.col(0).norm() * of.col(1).norm();
+    }
+
+    // [e1 e2 n], n of unit length: from triangle to triangle this maps plane to plane, and normal to normal.
+    Matrix3d trihedron(int face) const {
+        Matrix3d columns = sides(face);
+        columns.col(2).normalize();
+        return columns;
+    }
+
+    // Of a triangle from the reference to the frame.
+    Matrix3d rotation(int face) const {
+        const Eigen::JacobiSVD<Matrix3d> svd(trihedron(face) * inverse_[face], Eigen::ComputeFullU | Eigen::ComputeFullV);
+        return svd.matrixU() * svd.matrixV().transpose();
+    }
+
+    static Eigen::Vector3d rotation_vector(const Matrix3d& rotation) {
+        const Eigen::AngleAxisd turn(rotation);
+        return turn.angle() * turn.axis();
     }
 
     void place(double* six) const {
@@ -129,13 +183,14 @@ private:
         for (std::size_t c = 0; c < count; ++c, six += 6) {
             Eigen::Map<Eigen::Vector3d> turn(six);
             turn.setZero();
-            if (const int root = components_->root[c]; root >= 0) {
-                const Eigen::JacobiSVD<Matrix3d> svd(trihedron(root) * inverse_[c], Eigen::ComputeFullU | Eigen::ComputeFullV);
-                const Eigen::AngleAxisd rotation(Matrix3d(svd.matrixU() * svd.matrixV().transpose()));
-                turn = rotation.angle() * rotation.axis();
-            }
+            if (const int root = components_->root[c]; root >= 0) turn = rotation_vector(rotation(root));
             centre[c] /= vertices[c] * diagonal_;
             std::copy(centre[c].begin(), centre[c].end(), six + 3);
+        }
+        for (const int part : further_) {
+            const int root = components_->root[components_->of[corners_[part][0]]];
+            Eigen::Map<Eigen::Vector3d>{six} = rotation_vector(rotation(root).transpose() * rotation(part));
+            six += 3;
         }
     }
 
@@ -152,8 +207,9 @@ private:
     std::vector<std::array<int, 3>> corners_;  // as given: OpenMesh may begin a triangle at another of its corners
     std::vector<char> solid_;
     std::unique_ptr<Components> components_;
+    std::vector<int> further_;
     std::vector<Mesh::EdgeHandle> edges_;  // in ascending order of their vertices
-    std::vector<Matrix3d> inverse_;        // of the trihedra of the components' roots in the reference
+    std::vector<Matrix3d> inverse_;        // of the trihedra in the reference, for the lowest triangle of each part
     double unit_ = 0, diagonal_ = 0;
 };
 

@@ -105,11 +105,16 @@ def check_lengths(oracle):
         return None if reply["status"] == "unsupported" else reply["out.z"]
 
     test_shapes.check_lengths_encode("openmesh", encode, np.random.default_rng(1), books=False, turned_over=False, near=3e-8)
+    test_shapes.check_odd_lengths("openmesh", encode, np.random.default_rng(2), books=False, near=3e-8)
+    test_shapes.check_threshold("openmesh", encode, 2 * 5 + 6, 6)
     settle()
     flat, F = test_shapes.strip(2)
     flaps = oracle.run("shape.lengths_encode", reference=flat, F=np.concatenate([F, test_shapes.NEEDLE]), frames=flat[None])
     np.testing.assert_allclose(flaps["out.z"][0, 1:20:2], np.zeros(10), atol=3e-8)
-    refused(oracle.run("shape.lengths_encode", reference=flat, F=F, frames=flat[None] * [1, 0, 1]))  # a collapsed triangle
+    for height in (0, 1e-15):  # collapsed triangles
+        refused(oracle.run("shape.lengths_encode", reference=flat, F=F, frames=flat[None] * [1, height, 1]))
+    low = oracle.run("shape.lengths_encode", reference=flat, F=F, frames=flat[None] * [1, 1e-11, 1])
+    np.testing.assert_allclose(low["out.z"][0, 1:18:2], np.zeros(9), atol=3e-8)
     refused(oracle.run("shape.lengths_encode", reference=flat, F=np.array([[0, 1, 1]]), frames=flat[None]))
     refused(oracle.run("shape.lengths_encode", reference=flat, F=F + 9, frames=flat[None]), "error")
 

@@ -1,5 +1,5 @@
-"""shape.lengths_encode by libigl: edge_flaps for the edges and their two triangles, edge_lengths, per_face_normals, and polar_svd for the rotation of
-each component.
+"""shape.lengths_encode by libigl: edge_flaps for the edges and their two triangles, edge_lengths, per_face_normals, facet_components for the parts,
+and polar_svd for the rotations of components and parts.
 
 `seconds` is the work on the frames: edges and flaps depend on the faces alone and are found before.
 
@@ -15,7 +15,7 @@ from importlib.metadata import version
 import igl
 import numpy as np
 
-from shape_mesh import Mesh, log_rotation
+from shape_mesh import Mesh, log_rotation, solid_triangles
 from wire import Unsupported, serve
 
 
@@ -35,8 +35,19 @@ class Encoder:
         corner = corners[self.paired, 0]
         self.start, self.end = self.F[self.f, (corner + 1) % 3], self.F[self.f, (corner + 2) % 3]
         self.unit = self.lengths(mesh.reference).mean()
-        self.roots = self.F[mesh.root[mesh.root >= 0]]
+        self.rooted, self.further = np.flatnonzero(mesh.root >= 0), self.further_parts()
+        self.home = np.searchsorted(self.rooted, mesh.component[self.F[self.further, 0]])  # among the components that have triangles
+        self.roots = self.F[np.concatenate([mesh.root[self.rooted], self.further])]
+        self.d = 2 * len(self.edges) + 6 * mesh.C + 3 * len(self.further)
         self.inverse = np.linalg.inv(self.trihedra(mesh.reference))
+
+    def further_parts(self):
+        """Their lowest triangles, ascending."""
+        solid = np.flatnonzero(self.mesh.solid)
+        if not len(solid):
+            return solid
+        part = igl.facet_components(np.ascontiguousarray(self.F[solid]))[1]
+        return np.setdiff1d(solid[np.unique(part, return_index=True)[1]], self.mesh.root)
 
     def lengths(self, x):
         return igl.edge_lengths(x, self.edges).ravel()
@@ -48,8 +59,6 @@ class Encoder:
 
     def angles(self, x):
         normals = igl.per_face_normals(x, self.F, np.zeros(3))
-        if not np.all(np.any(normals[self.mesh.solid], axis=1)):
-            raise Unsupported("a frame has a degenerate triangle, without a normal, that is not degenerate in the reference")
         n_f, n_g, t = normals[self.f], normals[self.g], x[self.end] - x[self.start]
         sine = np.vecdot(np.cross(n_f, n_g), t) / np.linalg.norm(t, axis=1)
         return np.arctan2(sine, np.vecdot(n_f, n_g))
@@ -60,9 +69,11 @@ class Encoder:
         z[self.paired, 1] = self.angles(x)
         six = np.zeros((self.mesh.C, 6))
         maps = self.trihedra(x) @ self.inverse
-        six[self.mesh.root >= 0, :3] = log_rotation(np.array([igl.polar_svd(m)[0] for m in maps]))
+        R = np.array([igl.polar_svd(m)[0] for m in maps]).reshape(-1, 3, 3)
+        six[self.rooted, :3] = log_rotation(R[: len(self.rooted)])
         six[:, 3:] = self.mesh.centres(x) / self.mesh.diag
-        return np.concatenate([z.ravel(), six.ravel()])
+        three = log_rotation(R[self.home].transpose(0, 2, 1) @ R[len(self.rooted) :])
+        return np.concatenate([z.ravel(), six.ravel(), three.ravel()])
 
 
 def prepare(stage, inputs):
@@ -70,8 +81,9 @@ def prepare(stage, inputs):
         raise Unsupported(f"no stage {stage} here")
     mesh = Mesh(inputs["reference"], inputs["F"])
     frames, encoder = mesh.check_frames(inputs["frames"]), Encoder(mesh)
-    d = 2 * len(encoder.edges) + 6 * mesh.C
-    return lambda: {"z": np.array([encoder.encode(x) for x in frames]).reshape(-1, d)}
+    for x in frames:
+        solid_triangles(mesh, x)  # libigl makes normals of rounding
+    return lambda: {"z": np.array([encoder.encode(x) for x in frames]).reshape(-1, encoder.d)}
 
 
 if __name__ == "__main__":

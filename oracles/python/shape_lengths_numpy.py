@@ -1,5 +1,5 @@
-"""shape.lengths_encode by numpy: edge lengths over the reference's mean, signed dihedral angles by atan2, and the six numbers of each component as in
-shape_lric_numpy.py, whose triangle frames (closed 2x2 polar rotations) it uses. `seconds` is the work on the frames.
+"""shape.lengths_encode by numpy: edge lengths over the reference's mean, signed dihedral angles by atan2, and the numbers of components and
+further parts as in shape_lric_numpy.py, whose triangle frames (closed 2x2 polar rotations) it uses. `seconds` is the work on the frames.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ class Lengths:
         self.length_slot = np.cumsum(width) - width
         self.pair_slot = self.length_slot[edges.pair_edge] + 1 + edges.pair_rank
         self.size = width.sum()
-        self.d = self.size + 6 * mesh.C
+        self.d = self.size + 6 * mesh.C + 3 * len(edges.further)
         self.unit = self.lengths(mesh.reference).mean() if len(edges.vertices) else 1.0
 
     def lengths(self, x):

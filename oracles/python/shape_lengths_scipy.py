@@ -3,15 +3,15 @@ triangles below a tenth of their areas, with an analytic Jacobian J. The second 
 Gauss-Newton's part alone creeps on vectors of no frame; J^T J by SuperLU is the preconditioner. It starts from the linear reconstruction of
 shape_lric_numpy.py with the stretches that the lengths give: where z is that of a frame, it starts at the answer.
 
-`seconds` is everything that depends on z. The preconditioner's damping never moves the minimum, and settles the motions that z leaves free, which the six
-numbers fix.
+`seconds` is everything that depends on z. The preconditioner's damping never moves the minimum, and settles the motions that the numbers of edges leave
+free: the six numbers of a component place it at last, and parts that hang on a vertex stay as the start has turned them.
 """
 
 import numpy as np
 from scipy import sparse
 
 from shape_lengths_numpy import Lengths
-from shape_mesh import Mesh, corners_to_edges, exp_rotation, norms, serve_version, solid_triangles, spd_factor
+from shape_mesh import Mesh, corners_to_edges, norms, serve_version, solid_triangles, spd_factor
 from wire import Unsupported, serve
 
 STEPS = 200
@@ -27,12 +27,13 @@ FLAT = 1e-5  # a triangle without height, in parts of the reference's: angles ju
 
 
 class Residual:
-    """Of all numbers of the edges, and of the areas, for coordinates y in mean edge lengths; in the order of `given`: lengths, then angles of solid
-    pairs, then logarithms of the least areas of solid triangles, -inf where there is none."""
+    """Of the numbers of edges within components, and of the areas, for coordinates y in mean edge lengths; in the order of `given`: lengths, then angles
+    of solid pairs, then logarithms of the least areas of solid triangles, -inf where there is none."""
 
     def __init__(self, lengths):
         self.lengths, edges, mesh = lengths, lengths.edges, lengths.mesh
-        self.i, self.j = edges.vertices.T
+        self.within = mesh.component[edges.vertices[:, 0]] == mesh.component[edges.vertices[:, 1]]
+        self.i, self.j = edges.vertices[self.within].T
         pairs = edges.solid
         self.s, self.e = edges.pair_start[pairs], edges.pair_end[pairs]
         opposite = np.roll(mesh.F, 1, axis=1).ravel()  # of half-edge (a,b): c
@@ -46,7 +47,7 @@ class Residual:
         rows = np.repeat(np.arange(E + P + A), width)
 
         graph = sparse.csr_matrix((np.ones(len(rows)), (rows, vertices)), (E + P + A, mesh.V))
-        order = np.argsort(spd_factor((graph.T @ graph + 100 * E * sparse.eye(mesh.V)).tocsc()).perm_c)
+        order = np.argsort(spd_factor((graph.T @ graph + 100 * (E + 1) * sparse.eye(mesh.V)).tocsc()).perm_c)
         self.order = (3 * order[:, None] + np.arange(3)).ravel()
         columns = 3 * np.argsort(order)[vertices][:, None] + np.arange(3)
         self.pattern = columns.ravel(), np.concatenate([[0], np.cumsum(3 * width)])
@@ -72,7 +73,7 @@ class Residual:
         made = excess > 0
         factors = np.stack([longest + (middle + shortest), excess, shortest + (longest - middle), longest + (middle - shortest)])  # Kahan's, of Heron
         logs = np.log(np.where(made, factors, 1)).sum(axis=0) / 2 - np.log(4)
-        return np.concatenate([l, angles[self.lengths.edges.solid], np.where(made, np.log(LEAST_AREA) + logs, -np.inf)])
+        return np.concatenate([l[self.within], angles[self.lengths.edges.solid], np.where(made, np.log(LEAST_AREA) + logs, -np.inf)])
 
     def __call__(self, y, given, active=None):
         """The residuals and their Jacobian (columns in `order`), or None where a triangle has collapsed. The triangles of which the Jacobian has rows other
@@ -86,9 +87,7 @@ class Residual:
             return None
         chord = y[self.j] - y[self.i]
         length = norms(chord)
-        if length.min(initial=1.0) == 0:
-            return None
-        direction = (chord / length[:, None])[:, None] * np.array([[-1.0], [1.0]])
+        direction = (chord / np.where(length > 0, length, 1)[:, None])[:, None] * np.array([[-1.0], [1.0]])  # may be 0 at degenerate triangles
 
         t = y[self.e] - y[self.s]
         t2 = np.square(t).sum(axis=1)
@@ -241,13 +240,14 @@ class Decoder:
 
     def __call__(self, z):
         lengths, mesh, lric = self.lengths, self.mesh, self.lric
-        l, angles, six = z[lengths.length_slot], z[lengths.pair_slot], z[lengths.size :].reshape(-1, 6)
-        x = self.start(self.stretches(l * lengths.unit), angles, six)
+        l, angles, tail = z[lengths.length_slot], z[lengths.pair_slot], z[lengths.size :]
+        x = self.start(self.stretches(l * lengths.unit), angles, tail)
         x = lengths.unit * stationary(self.residual, x / lengths.unit, self.residual.given(l, angles))
-        turned = lric.triangle_frames(x)[1][lric.roots]
+        R, centres, _ = lric.placed(tail)
+        root = mesh.root[lric.rooted]
         turn = np.tile(np.eye(3), (mesh.C, 1, 1))
-        turn[lric.rooted] = exp_rotation(six[lric.rooted, :3]) @ lric.B0[lric.roots] @ turned.transpose(0, 2, 1)
-        return mesh.place(np.einsum("vij,vj->vi", turn[mesh.component], x), six[:, 3:] * mesh.diag)
+        turn[lric.rooted] = R[lric.rooted] @ lric.B0[root] @ lric.triangle_frames(x)[1][root].transpose(0, 2, 1)
+        return mesh.place(np.einsum("vij,vj->vi", turn[mesh.component], x), centres)
 
 
 def prepare(stage, inputs):

@@ -10,14 +10,15 @@ Known differences and limits of trimesh:
 - the angle is an arccosine: near 0 and near pi it is good to about 2e-8 only, elsewhere to rounding;
 - face_adjacency leaves out edges with more than two triangles: unsupported;
 - a triangle of less than about 1e-13 in area has no normal to it, whatever the unit: unsupported.
-Components, degenerate triangles and centres are those of shape_mesh.py; the rotation of a component is scipy.linalg.polar's.
+Components, degenerate triangles and centres are those of shape_mesh.py; parts are trimesh.graph.connected_components of face_adjacency; the rotation
+of a component or a part is scipy.linalg.polar's.
 """
 
 import numpy as np
 import trimesh
 from scipy.linalg import polar
 
-from shape_mesh import Edges, Mesh, log_rotation, serve_version
+from shape_mesh import Edges, Mesh, log_rotation, serve_version, solid_triangles
 from wire import Unsupported, serve
 
 
@@ -41,7 +42,11 @@ class Encoder:
         alike = dict(zip(edges.pair_edge.tolist(), edges.alike.tolist()))
         self.alike = np.array([alike[slot] for slot in self.slot.tolist()], bool)
         self.rooted = np.flatnonzero(mesh.root >= 0)
-        self.inverse = {c: np.linalg.inv(trihedron(mesh.reference, mesh.F[mesh.root[c]])) for c in self.rooted}
+        adjacent = found.face_adjacency if len(mesh.F) else np.empty((0, 2), int)
+        parts = trimesh.graph.connected_components(adjacent[mesh.solid[adjacent].all(axis=1)], nodes=np.flatnonzero(mesh.solid), min_len=1)
+        self.further = np.setdiff1d([min(part) for part in parts], mesh.root).astype(int)  # the lowest triangles of further parts
+        self.inverse = {f: np.linalg.inv(trihedron(mesh.reference, mesh.F[f])) for f in [*mesh.root[self.rooted], *self.further]}
+        self.d = 2 * len(self.order) + 6 * mesh.C + 3 * len(self.further)
 
     def build(self, x):
         return trimesh.Trimesh(x, self.mesh.F, process=False, validate=False)
@@ -62,10 +67,14 @@ class Encoder:
 
     def encode(self, x):
         numbers, six = self.numbers(self.build(x)), np.zeros((self.mesh.C, 6))
-        for c, inverse in self.inverse.items():
-            six[c, :3] = log_rotation(polar(trihedron(x, self.mesh.F[self.mesh.root[c]]) @ inverse)[0])
+        R = {f: polar(trihedron(x, self.mesh.F[f]) @ inverse)[0] for f, inverse in self.inverse.items()}
+        root = self.mesh.root
+        for c in self.rooted:
+            six[c, :3] = log_rotation(R[root[c]])
         six[:, 3:] = self.mesh.centres(x) / self.mesh.diag
-        return np.concatenate([numbers, six.ravel()])
+        home = self.mesh.component[self.mesh.F[self.further, 0]]
+        three = [log_rotation(R[root[c]].T @ R[f]) for c, f in zip(home, self.further)]
+        return np.concatenate([numbers, six.ravel(), *three])
 
 
 def prepare(stage, inputs):
@@ -73,8 +82,9 @@ def prepare(stage, inputs):
         raise Unsupported(f"no stage {stage} here")
     mesh = Mesh(inputs["reference"], inputs["F"])
     frames, encoder = mesh.check_frames(inputs["frames"]), Encoder(mesh)
-    d = 2 * len(encoder.order) + 6 * mesh.C
-    return lambda: {"z": np.array([encoder.encode(x) for x in frames]).reshape(-1, d)}
+    for x in frames:
+        solid_triangles(mesh, x)  # trimesh makes normals of rounding
+    return lambda: {"z": np.array([encoder.encode(x) for x in frames]).reshape(-1, encoder.d)}
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ reducing order does not), while the Laplacian is factored before.
 import numpy as np
 from scipy import sparse
 
-from shape_mesh import RT2, Edges, Mesh, Poisson, axes, exp_rotation, log_rotation, nearest_rotation, serve_version, solid_triangles, spd_factor, unit
+from shape_mesh import RT2, Edges, Mesh, Poisson, axes, exp_rotation, log_rotation, nearest_rotation, norms, serve_version, solid_triangles
+from shape_mesh import spd_factor, unit
 from wire import Unsupported, serve
 
 
@@ -25,13 +26,14 @@ class Lric:
         self.half_slot = (begin[edges.edge] + edges.rank).reshape(-1, 3)
         self.pair_slot = begin[edges.pair_edge] + edges.count[edges.pair_edge] + edges.pair_rank
         self.size = width.sum()
-        self.d = self.size + 6 * mesh.C
+        self.d = self.size + 6 * mesh.C + 3 * len(edges.further)
         self.B0 = np.tile(np.eye(3), (len(mesh.F), 1, 1))
         self.B0[solid] = axes(mesh.e1[solid], mesh.normal[solid])
         self.plane = np.stack([plane_coordinates(self.B0, e) for e in (mesh.e1, mesh.e2 - mesh.e1, -mesh.e2)], axis=1)  # of the half-edges
         self.inverse = np.linalg.inv(np.stack([self.plane[solid, 0], -self.plane[solid, 2]], axis=2))
         self.rooted = np.flatnonzero(mesh.root >= 0)
-        self.roots = mesh.root[self.rooted]
+        self.roots = np.concatenate([mesh.root[self.rooted], edges.further])  # the lowest triangles of all parts, those of components first
+        self.home = mesh.component[mesh.F[edges.further, 0]]  # the components of further parts
 
     def triangle_frames(self, x):
         """U (F,2,2) and the axes (F,3,3), columns u, v, normal, with D2 = [u v] U D2_0; degenerate triangles: U = I."""
@@ -47,11 +49,21 @@ class Lric:
         return U, turned
 
     def placement(self, x, turned):
-        """The six numbers of each component."""
-        six = np.zeros((self.mesh.C, 6))
-        six[self.rooted, :3] = log_rotation(turned[self.roots] @ self.B0[self.roots].transpose(0, 2, 1))
-        six[:, 3:] = self.mesh.centres(x) / self.mesh.diag
-        return six.ravel()
+        """The six numbers of each component, then the three of each further part."""
+        mesh, R = self.mesh, turned @ self.B0.transpose(0, 2, 1)
+        six = np.zeros((mesh.C, 6))
+        six[self.rooted, :3] = log_rotation(R[mesh.root[self.rooted]])
+        six[:, 3:] = mesh.centres(x) / mesh.diag
+        three = log_rotation(R[mesh.root[self.home]].transpose(0, 2, 1) @ R[self.edges.further])
+        return np.concatenate([six.ravel(), three.ravel()])
+
+    def placed(self, tail):
+        """Of those numbers: the rotations of components, their centres, and the axes of the lowest triangles of all parts."""
+        six, three = np.split(tail, [6 * self.mesh.C])
+        six = six.reshape(-1, 6)
+        R = exp_rotation(six[:, :3])
+        of_parts = np.concatenate([R[self.rooted], R[self.home] @ exp_rotation(three.reshape(-1, 3))])
+        return R, six[:, 3:] * self.mesh.diag, of_parts @ self.B0[self.roots]
 
     def encode(self, x):
         U, turned = self.triangle_frames(x)
@@ -68,6 +80,8 @@ class Lric:
 
         def triad(f, half, sign):
             t = np.einsum("pij,pj->pi", U[f], self.plane[f, half % 3]) * sign[:, None]
+            if not np.all(norms(t)[edges.solid] > 0):
+                raise Unsupported("an edge has no length: nothing says how its triangles turn")
             t = unit(np.column_stack([t, np.zeros(len(t))]))
             normal = np.broadcast_to([0.0, 0, 1], t.shape)
             return np.stack([t, np.cross(normal, t), normal], axis=2)
@@ -79,15 +93,14 @@ class Lric:
 
     def decoder(self):
         mesh, edges = self.mesh, self.edges
-        edges.require_joined(mesh)
         poisson = Poisson(mesh).factor()
         rotations = RotationSystem(len(mesh.F), edges.f[edges.solid], edges.g[edges.solid], self.roots, np.flatnonzero(mesh.solid))
 
-        def decode(U, angles, six):
-            given = exp_rotation(six[self.rooted, :3]) @ self.B0[self.roots]
+        def decode(U, angles, tail):
+            _, centres, given = self.placed(tail)
             R = rotations.solve(self.transitions(U, angles), given)
             x = poisson.solve(R[:, :, :2] @ U @ self.B0[:, :, :2].transpose(0, 2, 1))
-            return mesh.place(x, six[:, 3:] * mesh.diag)
+            return mesh.place(x, centres)
 
         return decode
 
@@ -95,7 +108,7 @@ class Lric:
         a, b, c = z[self.half_slot].T
         U = np.stack([a, c / RT2, c / RT2, b], axis=1).reshape(-1, 2, 2)
         U[~self.mesh.solid] = np.eye(2)
-        return U, z[self.pair_slot], z[self.size :].reshape(-1, 6)
+        return U, z[self.pair_slot], z[self.size :]
 
 
 class RotationSystem:

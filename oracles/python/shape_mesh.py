@@ -1,5 +1,5 @@
 """What the shape-space oracles of this folder have in common: the vocabulary of section "The stages of shape spaces" of PROTOCOL.md (degenerate
-triangles, components, edges, pairs), the six numbers of symmetric matrices, and the Poisson equation. No oracle by itself.
+triangles, components, edges, pairs, parts), the six numbers of symmetric matrices, and the Poisson equation. No oracle by itself.
 """
 
 import os
@@ -29,7 +29,13 @@ def norms(v):
 
 
 def is_degenerate(e1, e2, normal):
-    return norms(normal) <= 1e-10 * np.maximum(np.maximum(norms(e1), norms(e2)), norms(e2 - e1)) ** 2
+    """In the reference."""
+    return norms(normal) <= 1e-5 * np.maximum(np.maximum(norms(e1), norms(e2)), norms(e2 - e1)) ** 2
+
+
+def has_collapsed(e1, e2, normal):
+    """To a line, in a frame: what is left of the normal is rounding."""
+    return norms(normal) <= 1e-14 * norms(e1) * norms(e2)
 
 
 def unit(v):
@@ -82,7 +88,7 @@ class Mesh:
 
 
 class Edges:
-    """The edges of a mesh and their pairs. Half-edges are numbered 3 f + corner: (a,b), (b,c), (c,a)."""
+    """The edges of a mesh, their pairs, and the further parts. Half-edges are numbered 3 f + corner: (a,b), (b,c), (c,a)."""
 
     def __init__(self, mesh):
         F = mesh.F
@@ -90,28 +96,32 @@ class Edges:
             raise Unsupported("a triangle names a vertex twice: its half-edges are not defined")
         self.start, self.end = F.ravel(), np.roll(F, -1, axis=1).ravel()
         keys = np.minimum(self.start, self.end) * mesh.V + np.maximum(self.start, self.end)
-        unique, self.first, self.edge, self.count = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
+        unique, self.edge, self.count = np.unique(keys, return_inverse=True, return_counts=True)
         self.vertices = np.column_stack([unique // mesh.V, unique % mesh.V])
         order = np.argsort(keys, kind="stable")
         begin = np.cumsum(self.count) - self.count
         self.rank = np.empty(len(keys), int)  # of a half-edge among those of its edge
         self.rank[order] = np.arange(len(keys)) - begin[self.edge[order]]
 
-        g = order[self.rank[order] > 0]  # by edge, then by triangle
-        f = self.first[self.edge[g]]
-        self.pair_edge, self.pair_rank = self.edge[g], self.rank[g] - 1
+        # The pairs of an edge start from its lowest triangle that is not degenerate, or from its lowest where all are.
+        head = np.lexsort((np.arange(len(keys)), np.repeat(~mesh.solid, 3), keys))[begin]
+        g = order[order != head[self.edge[order]]]  # by edge, then by triangle
+        self.pair_edge = self.edge[g]
+        f = head[self.pair_edge]
+        pairs = self.count - 1
+        self.pair_rank = np.arange(len(g)) - (np.cumsum(pairs) - pairs)[self.pair_edge]
         self.half_f, self.half_g, self.f, self.g = f, g, f // 3, g // 3
         self.pair_start, self.pair_end = self.start[f], self.end[f]
         self.alike = self.start[f] == self.start[g]  # both run along the edge in the same direction
         self.solid = mesh.solid[self.f] & mesh.solid[self.g]  # else the pair's dihedral angle is 0, and decoding ignores it
+        self.further = self.further_parts(mesh)
 
-    def require_joined(self, mesh):
-        """Rotations pass from triangle to triangle over pairs: they must reach a whole component."""
+    def further_parts(self, mesh):
+        """Their lowest triangles, ascending. Rotations pass from triangle to triangle over pairs, and reach no further than a part."""
         f, g = self.f[self.solid], self.g[self.solid]
         graph = sparse.coo_matrix((np.ones(len(f)), (f, g)), (len(mesh.F), len(mesh.F)))
-        pieces, label = connected_components(graph, directed=False)
-        if len(np.unique(label[mesh.solid])) != np.count_nonzero(mesh.root >= 0):
-            raise Unsupported("a component has triangles that only a vertex joins: their rotation is not determined")
+        part, solid = connected_components(graph, directed=False)[1], np.flatnonzero(mesh.solid)
+        return np.setdiff1d(solid[np.unique(part[solid], return_index=True)[1]], mesh.root)
 
     def dihedral_angles(self, mesh, x):
         normals = np.zeros((len(mesh.F), 3))
@@ -124,10 +134,11 @@ class Edges:
 
 
 def solid_triangles(mesh, x):
-    """corners_to_edges of the triangles that are not degenerate in the reference; they must not be in x either."""
+    """corners_to_edges of the triangles that are not degenerate in the reference. PROTOCOL.md has a normal for those that collapse in x; here there is
+    none."""
     e1, e2, normal = corners_to_edges(x, mesh.F[mesh.solid])
-    if np.any(is_degenerate(e1, e2, normal)):
-        raise Unsupported("a frame has a degenerate triangle, without a normal, that is not degenerate in the reference")
+    if np.any(has_collapsed(e1, e2, normal)):
+        raise Unsupported("a frame collapses a triangle to a line: it has no normal here")
     return e1, e2, normal
 
 

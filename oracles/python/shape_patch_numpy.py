@@ -32,10 +32,15 @@ class Patches:
             raise ValueError("a patch is empty, or lies in several components")
         self.rooted, self.roots = np.unique(home[:, 0], return_index=True)  # the components that have patches; their lowest patches
         self.pairs = self.adjacent()
+        graph = sparse.coo_matrix((np.ones(len(self.pairs)), self.pairs.T), (self.P, self.P))
+        lowest = np.unique(connected_components(graph, directed=False)[1], return_index=True)[1]
+        self.further = np.setdiff1d(lowest, self.roots)  # the lowest patches of the sets that adjacency joins, but those of components
+        self.home = np.searchsorted(self.rooted, home[self.further, 0])  # their components, among those that have patches
         self.inverse = inverse_edges(mesh)
         self.gathering = sparse.csr_matrix((mesh.area[self.solid], (self.of, np.arange(len(self.of)))), (self.P, len(self.of)))
         self.triangles, self.adjacency = 9 * len(mesh.F), 3 * len(self.pairs)
-        self.d = self.triangles + self.adjacency + 6 * mesh.C
+        self.sections = np.cumsum([self.triangles, self.adjacency, 6 * mesh.C])
+        self.d = self.sections[-1] + 3 * len(self.further)
 
     def adjacent(self):
         F, V = self.mesh.F[self.solid], self.mesh.V
@@ -47,32 +52,35 @@ class Patches:
 
     def encode(self, x):
         mesh, z = self.mesh, np.zeros(self.d)
+        triangles, between, six, three = self.split(z)
         R, S = polar_by_svd(edge_matrices(x, mesh.F[self.solid]) @ self.inverse)
         of_patch = nearest_rotation((self.gathering @ R.reshape(-1, 9)).reshape(-1, 3, 3))
         back = of_patch.transpose(0, 2, 1)
-        triangles = z[: self.triangles].reshape(-1, 9)
         triangles[:, 3:6] = 1
         triangles[self.solid] = np.concatenate([log_rotation(back[self.of] @ R), to_six(S)], axis=1)
         p, q = self.pairs.T
-        z[self.triangles : self.triangles + self.adjacency] = log_rotation(back[p] @ of_patch[q]).ravel()
-        six = z[self.triangles + self.adjacency :].reshape(-1, 6)
+        between[:] = log_rotation(back[p] @ of_patch[q])
         six[self.rooted, :3] = log_rotation(of_patch[self.roots])
         six[:, 3:] = mesh.centres(x) / mesh.diag
+        three[:] = log_rotation(back[self.roots[self.home]] @ of_patch[self.further])
         return z
+
+    def split(self, z):
+        """Views of z: the numbers of triangles (F,9), of adjacent pairs (A,3), of components (C,6) and of further sets of patches (.,3)."""
+        return [part.reshape(-1, width) for part, width in zip(np.split(z, self.sections), (9, 3, 6, 3))]
 
     def decoder(self):
         mesh, (p, q) = self.mesh, self.pairs.T
-        graph = sparse.coo_matrix((np.ones(len(p)), (p, q)), (self.P, self.P))
-        if connected_components(graph, directed=False)[0] != len(self.roots):
-            raise Unsupported("a component has patches that only a vertex joins: their rotation is not determined")
-        poisson, rotations = Poisson(mesh).factor(), RotationSystem(self.P, p, q, self.roots, np.arange(self.P))
+        given = np.concatenate([self.roots, self.further])
+        poisson, rotations = Poisson(mesh).factor(), RotationSystem(self.P, p, q, given, np.arange(self.P))
 
         def decode(z):
-            triangles = z[: self.triangles].reshape(-1, 9)[self.solid]
-            six = z[self.triangles + self.adjacency :].reshape(-1, 6)
-            between = exp_rotation(z[self.triangles : self.triangles + self.adjacency].reshape(-1, 3))
-            of_patch = rotations.solve(between, exp_rotation(six[self.rooted, :3]))
+            triangles, between, six, three = self.split(z)
+            R = exp_rotation(six[self.rooted, :3])
+            R = np.concatenate([R, R[self.home] @ exp_rotation(three)])
+            of_patch = rotations.solve(exp_rotation(between), R)
             T = np.zeros((len(mesh.F), 3, 3))
+            triangles = triangles[self.solid]
             T[self.solid] = of_patch[self.of] @ exp_rotation(triangles[:, :3]) @ from_six(triangles[:, 3:])
             return mesh.place(poisson.solve(T), six[:, 3:] * mesh.diag)
 

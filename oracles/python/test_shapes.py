@@ -3,6 +3,8 @@
 Nothing here comes from shape_mesh.py or another oracle: what is expected is written out, or made with the few lines below.
 """
 
+import functools
+
 import numpy as np
 
 from checking import Oracle, check, close
@@ -61,6 +63,124 @@ def world(rng, degenerate=True):
     return {"reference": reference, "F": faces}, np.array(frames)
 
 
+# Triangles and vertices of every odd kind. 0: degenerate, the lowest of three at the spine (0,1); 1, 2: a book's pages; 3: degenerate, between the two fans
+# 4, 5 and 6, 7 about vertex 5, and joined to both; 8: hangs on vertex 4; 9: of no area, on a side of 10, with two vertices in one place; vertex 14: of none.
+ODD_FACES = np.array(
+    [[0, 1, 2], [0, 1, 3], [1, 0, 4], [5, 8, 9], [5, 6, 7], [5, 7, 8], [5, 9, 10], [5, 10, 11], [4, 12, 13], [15, 16, 17], [15, 17, 18]]
+)
+ODD_VERTICES = np.array(
+    [[0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.4, 1, 0.1], [0.6, -1.2, 0.3]]
+    + [[5, 0, 0], [5, 1, 0.2], [5.8, 1, -0.1], [6, 0, 0], [4, 0, 0], [4.2, -1, 0.1], [5, -1, 0.3]]
+    + [[1.5, -2, 0], [0.5, -2.2, 0.4], [7, 7, 7], [0, 3, 0], [0, 3, 0], [1, 3, 0], [0, 4, 0]]
+)
+ODD_COMPONENTS = [[0, 1, 3, 4, 12, 13], [2], [5, 6, 7, 8, 9, 10, 11], [14], [15, 17, 18], [16]]
+ODD_BENDS = np.array([[0.4, -0.9, 0.3], [1.1, 0.2, -0.5]])  # of the further parts, whose lowest triangles are 6 and 8
+
+
+class Odd:
+    """The mesh above, and frames of it: one of components turned by `spins` (V,3), with further parts bent, and two like it of any shape."""
+
+    def __init__(self, rng):
+        self.x0, self.F, self.components, self.bends = ODD_VERTICES, ODD_FACES, ODD_COMPONENTS, ODD_BENDS
+        self.degenerate = np.isin(np.arange(len(self.F)), [0, 3, 9])
+        x, self.spins = self.x0.copy(), np.zeros((len(self.x0), 3))
+        for bend, hinge, hanging in zip(self.bends, (5, 4), ([9, 10, 11], [12, 13])):
+            x[hanging] = rigid(x[hanging] - x[hinge], bend, x[hinge])
+        for component, spin in zip(self.components, rng.uniform(-1.5, 1.5, (len(self.components), 3))):  # none by half a turn
+            self.spins[component] = spin * (len(component) > 1)
+            x[component] = rigid(x[component], spin, rng.normal(size=3))
+        self.frames = x + [[[0.0]], [[0.05]], [[0.1]]] * rng.normal(size=(3, *x.shape))
+
+    def without_page(self):
+        """No edge has three triangles any more; the tip of the page is by itself."""
+        tip = np.setdiff1d(self.F[1], self.F[2])[0]
+        self.F, self.degenerate = np.delete(self.F, 1, axis=0), np.delete(self.degenerate, 1)
+        self.components = sorted([[v for v in component if v != tip] for component in self.components] + [[tip]])
+        self.spins[tip] = 0
+        return self
+
+    def mirrored(self):
+        """In space, and in the numbers of vertices, so that other edges come first; surfaces keep their outer sides, and edges their angles."""
+        last = len(self.x0) - 1
+        self.x0, self.frames = self.x0[::-1] * [-1, 1, 1], self.frames[:, ::-1] * [-1, 1, 1]
+        self.F = (last - self.F)[:, ::-1]
+        self.components = sorted(sorted(last - v for v in component) for component in self.components)
+        self.spins, self.bends = self.spins[::-1] * [1, -1, -1], self.bends * [1, -1, -1]
+        return self
+
+    def edge_numbers(self, x):
+        """Of every edge its length, then the angles of its pairs: where the corner of the second triangle lies, seen from the first."""
+        numbers = []
+        for i, j in edge_list(self.F).tolist():
+            triangles = [f for f, corners in enumerate(self.F.tolist()) if {i, j} <= set(corners)]
+            head = min([f for f in triangles if not self.degenerate[f]] or triangles)
+            numbers.append([np.linalg.norm(x[j] - x[i]) / mean_length(self.x0, self.F)])
+            for f in triangles:
+                if f != head:
+                    numbers[-1].append(0.0 if self.degenerate[[head, f]].any() else angle_across(x, self.F[head].tolist(), self.F[f].tolist()))
+        return numbers
+
+    def placement(self):
+        """Of the first frame: the six numbers of components, then the three of further parts."""
+        six = [[*self.spins[component[0]], *self.frames[0, component].mean(axis=0) / diagonal(self.x0)] for component in self.components]
+        return np.concatenate([np.ravel(six), self.bends.ravel()])
+
+
+def angle_across(x, f, g):
+    """The dihedral angle of triangles f and g: 0 where the corners beside their edge lie opposite, positive where that of g is below f."""
+    (third,), (other,) = set(f) - set(g), set(g) - set(f)
+    i, j = f[f.index(third) - 2], f[f.index(third) - 1]
+    t = (x[j] - x[i]) / np.linalg.norm(x[j] - x[i])
+    p, q = (v - t * (t @ v) for v in (x[third] - x[i], x[other] - x[i]))
+    return np.arctan2(-np.cross(t, p) @ q, -p @ q)
+
+
+def check_odd_motion(name, encode, odd, numbers, tolerance):
+    """Moved as a whole, the mesh changes none but the six numbers of components, which follow the `numbers` of edges."""
+    z, moved = (encode(odd.x0, odd.F, frames) for frames in (odd.frames, rigid(odd.frames, SPIN, SHIFT)))
+    six = slice(numbers, numbers + 6 * len(odd.components))
+    close(f"{name}: a motion of all changes no numbers but those of components", np.delete(moved, six, axis=1), np.delete(z, six, axis=1), tolerance)
+    turned = [c for c, component in enumerate(odd.components) if len(component) > 1]
+    r, s = (y[:, six].reshape(len(z), -1, 6)[:, turned, :3].reshape(-1, 3) for y in (z, moved))
+    close(f"{name}: it turns all components alike", [turning(b) @ turning(a).T for a, b in zip(r, s)], [turning(SPIN)] * len(r))
+
+
+def check_odd_lengths(program, encode, rng, books=True, near=1e-11):
+    """`encode` and the limits as in check_lengths_encode."""
+    if not books:
+        odd = Odd(rng)
+        check(f"{program}: three triangles at an edge, one of them degenerate, are unsupported", encode(odd.x0, odd.F, odd.frames) is None)
+    for name, odd in odd_kinds(rng, books).items():
+        z = encode(odd.x0, odd.F, odd.frames)
+        expected = [np.concatenate([row + [0.0] * (2 - len(row)) for row in odd.edge_numbers(x)]) for x in odd.frames]
+        numbers = len(expected[0])
+        close(f"{program}: {name}: lengths and angles", z[:, :numbers], expected, near)
+        close(f"{program}: {name}: components, then further parts by lowest triangle", z[0, numbers:], odd.placement())
+        check_odd_motion(f"{program}: {name}", encode, odd, numbers, near)
+
+
+def odd_kinds(rng, books=True):
+    kinds = {"odd": Odd(rng), "odd and mirrored": Odd(rng).mirrored()}
+    return kinds if books else {f"{name}, a page less": odd.without_page() for name, odd in kinds.items()}
+
+
+def check_odd_decode(name, encode, decode, rng, **more):
+    for kind, odd in odd_kinds(rng).items():
+        z = encode(reference=odd.x0, F=odd.F, **more, frames=odd.frames)["z"]
+        close(f"{name}: {kind}: decodes what it encodes", decode(reference=odd.x0, F=odd.F, **more, z=z)["frames"], odd.frames, 1e-10)
+
+
+def sliver(height):
+    """A triangle whose longest edge is 1, of this height, below a larger one."""
+    return np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -height, 0]]), np.array([[0, 1, 2], [1, 0, 3]])
+
+
+def check_threshold(name, encode, size, more):
+    """`size` numbers of one component, and `more` of another where the sliver is degenerate: `encode` as in check_lengths_encode."""
+    sizes = [encode(*sliver(height), sliver(height)[0][None]).shape[1] for height in (1.1e-5, 0.9e-5)]
+    close(f"{name}: what is degenerate", sizes, [size, size + more], 0)
+
+
 def diagonal(x):
     return np.linalg.norm(np.ptp(x, axis=0))
 
@@ -101,6 +221,7 @@ def check_gradient_encode(program, oracle, rng):
     close(f"{program}: a degenerate triangle is at rest", z[:, 54:63], [[0, 0, 0, *still]] * 3)
     centres = [[x[:8].mean(axis=0), x[8], x[9:].mean(axis=0)] for x in frames]
     close(f"{program}: centres of components, by lowest vertex", z[:, -9:], np.reshape(centres, (3, 9)) / diagonal(inputs["reference"]))
+    check_threshold(program, lambda x0, F, frames: oracle.run(reference=x0, F=F, frames=frames)["z"], 9 * 2 + 3, 3)
     check(f"{program}: a face without its vertex", oracle.status(reference=flat, F=F + 99, frames=flat[None]) == "error")
 
 
@@ -122,6 +243,7 @@ def check_gradient_decode(program, oracle, rng):
     mixed = (z[0] + z[1] + z[2]) / 3
     found = oracle.run(**decode, **inputs, z=mixed[None])["frames"][0]
     close(f"{program}: decodes a mean of three by least squares", found, dense_gradient_decode(inputs, mixed), 1e-10)
+    check_odd_decode(program, oracle.run, functools.partial(oracle.run, **decode), rng)
 
 
 def dense_gradient_decode(inputs, z):
@@ -247,8 +369,12 @@ def test_lengths_encode(rng):
             flat, F = strip(2)
             z = oracle.run(reference=flat, F=np.concatenate([F, NEEDLE]), frames=flat[None])["z"]
             close(f"shape_lengths_{library}: a degenerate triangle has lengths and no angles", z[0, 1:20:2], np.zeros(10), known.get("near", 1e-11))
-            collapsed = oracle.status(reference=flat, F=F, frames=flat[None] * [1, 0, 1])
-            check(f"shape_lengths_{library}: a collapsed triangle", collapsed == "unsupported")
+            check_odd_lengths(f"shape_lengths_{library}", encode, rng, known.get("books", True), known.get("near", 1e-11))
+            check_threshold(f"shape_lengths_{library}", encode, 2 * 5 + 6, 6)
+            for height in (0, 1e-15):
+                check(f"shape_lengths_{library}: triangles of height {height} in a frame", encode(flat, F, flat[None] * [1, height, 1]) is None)
+            low = encode(flat, F, flat[None] * [1, 1e-11, 1])
+            close(f"shape_lengths_{library}: triangles of height 1e-11 lie flat", low[0, 1:18:2], np.zeros(9), known.get("near", 1e-11))
 
 
 def test_lengths_decode(rng):
@@ -266,6 +392,15 @@ def test_lengths_decode(rng):
         for name, (inputs, frames) in {"a world": world(rng), "a book": book_frames()}.items():
             z = encoder.run(**inputs, frames=frames)["z"]
             close(f"shape_lengths: decodes {name} it encodes", decoder.run(**inputs, z=z)["frames"], frames, 1e-10)
+        check_odd_decode("shape_lengths", encoder.run, decoder.run, rng)
+        odd = Odd(rng)
+        inputs = {"reference": odd.x0, "F": odd.F}
+        z = encoder.run(**inputs, frames=odd.frames)["z"]
+        for i, edge in enumerate(edge_list(odd.F).tolist()):
+            if edge in ([0, 2], [1, 2], [15, 16], [16, 17]):
+                z[:, 2 * i + 1] += 0.5  # the spine, before them all, has three numbers
+        found = decoder.run(**inputs, z=z)["frames"]
+        close("shape_lengths_scipy: edges between components have no say", found, odd.frames, 1e-10)
         tetrahedron, F = TETRAHEDRON
         z = encoder.run(reference=tetrahedron, F=F, frames=tetrahedron[None])["z"]
         z[0, 1:12:2] = 2.1  # angles of no tetrahedron of these lengths: by symmetry its edges become other, but equal
@@ -282,6 +417,12 @@ def sheet(cells, angle, squeeze=1.0):
     corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).reshape(-1, 1)
     beyond = corner + cells + 1
     return x, np.concatenate([np.hstack([corner, beyond, beyond + 1]), np.hstack([corner, beyond + 1, corner + 1])])
+
+
+def bow(x, F, turn=(0, 0, 0)):
+    """A surface twice, joined at its vertex 0 alone: the second half a turn about +z from the first, and then by `turn`."""
+    other = rigid((x - x[0]) * [-1, -1, 1], turn, x[0])
+    return np.concatenate([x, other[1:]]), np.concatenate([F, np.where(F > 0, F + len(x) - 1, 0)])
 
 
 def across(cells, angle, squeeze=1.0):
@@ -325,6 +466,22 @@ def test_lengths_means():
         z = encoder.run(reference=flat, F=F, frames=np.array([strip(6, 0.4)[0], strip(6, 1.0)[0]]))["z"].mean(axis=0)
         middle = rigid(strip(6, 0.7)[0], [0, 0, 0], z[-3:] * diagonal(flat) - strip(6, 0.7)[0].mean(axis=0))
         close("shape_lengths_scipy: the mean of two rolls is the roll between", decoder.run(reference=flat, F=F, z=z[None])["frames"], [middle], 1e-10)
+
+        (flat, F), angles, turns = bow(*strip(6)), (0.4, 1.0), np.array([[0.3, -0.5, 0.1], [0.9, 0.3, 0.7]])
+        rolls = np.array([bow(*strip(6, angle), turn)[0] for angle, turn in zip(angles, turns)])
+        z = encoder.run(reference=flat, F=F, frames=rolls)["z"]
+        close("shape_lengths_numpy: a part that hangs on a vertex", z[:, -3:], turns)
+        middle = bow(*strip(6, 0.7), turns.mean(axis=0))[0]
+        middle += rolls.mean(axis=(0, 1)) - middle.mean(axis=0)
+        found = decoder.run(reference=flat, F=F, z=z.mean(axis=0)[None])["frames"]
+        close("shape_lengths_scipy: the mean of two rolls that hang on a vertex", found, [middle], 1e-10)
+        flat, F = bow(*sheet(3, 0.0))
+        frames = np.array([bow(x, sheet(3, 0.0)[1], turn)[0] for x, turn in zip((sheet(3, 0.5)[0], across(3, 0.5)), turns)])
+        inputs = {"reference": flat, "F": F}
+        z = encoder.run(**inputs, frames=frames)["z"].mean(axis=0)
+        found, size = cosines(encoder, inputs, z, decoder.run(**inputs, z=z[None])["frames"][0], 1e-5)
+        check("shape_lengths_scipy: the mean of two pairs of sheets that hang on a vertex is of no frame", size > 1e-4, f"{size:.2g}")
+        close("shape_lengths_scipy: it decodes to a stationary frame", found, np.zeros(flat.size), 1e-8)
 
         cases = ("", 1.0, 0.5, 1e-5, 1e-8), (", of needles", 1e-3, 0.02, 1e-8, 1e-6), (", of needles bent more", 1e-3, 0.2, 1e-9, 1e-5)
         for name, squeeze, angle, h, near in cases:
@@ -398,11 +555,27 @@ def test_lric(rng):
         x0, F = book(0, 0.9, -1.2)
         spine = oracle.run(reference=x0, F=F, frames=book(0.3, 1, -2)[0][None])["z"][0]
         close("lric: a book's spine: four stretches, then three angles", spine[:7], [1, 1, 1, 1, 0.3, 1, -2])
-        bow = np.array([[0, 1, 2], [0, 3, 4]]), np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, 1, 0]])
-        d = oracle.run(reference=bow[1], F=bow[0], frames=bow[1][None])["z"]
-        check("lric: triangles that only a vertex joins", oracle.status(**decode, reference=bow[1], F=bow[0], z=d) == "unsupported")
+        check_odd_lric(rng, lambda x0, F, frames: oracle.run(reference=x0, F=F, frames=frames)["z"])
+        check_odd_decode("lric", oracle.run, functools.partial(oracle.run, **decode), rng)
+        flat, F = fold(0)
+        z = oracle.run(reference=flat, F=F, frames=flat[None])["z"]
+        z[0, :2] = 0  # U of both triangles along the edge they share
+        check("lric: an edge without length", oracle.status(**decode, reference=flat, F=F, z=z) == "unsupported")
         twice = oracle.status(reference=right, F=np.array([[0, 1, 1]]), frames=right[None])
         check("lric: a triangle that names a vertex twice", twice == "unsupported")
+
+
+def check_odd_lric(rng, encode):
+    for name, odd in odd_kinds(rng).items():
+        z = encode(odd.x0, odd.F, odd.frames)
+        angles = [row[1:] for row in odd.edge_numbers(odd.frames[1])]
+        halves = np.array([len(row) + 1 for row in angles])  # of an edge: one more than pairs
+        begin = np.cumsum(np.append(0, np.maximum(3, 2 * halves - 1)))
+        found = [z[1, start + half : start + half + len(row)] for start, half, row in zip(begin, halves, angles)]
+        close(f"lric: {name}: angles", np.concatenate(found), np.concatenate(angles))
+        close(f"lric: {name}: components, then further parts by lowest triangle", z[0, begin[-1] :], odd.placement())
+        check_odd_motion(f"lric: {name}", encode, odd, begin[-1], 1e-11)
+    check_threshold("lric", encode, 3 * 5 + 6, 6)
 
 
 def test_patch(rng):
@@ -441,8 +614,21 @@ def test_patch(rng):
         inputs["patches"] = np.array([0, 0, 2, 2, 2, 2, -1, 1, 1, 1, 1])
         z = oracle.run(**inputs, frames=frames)["z"]
         close("patch: decodes the world it encodes", oracle.run(**decode, **inputs, z=z)["frames"], frames, 1e-10)
+        check_odd_patch(rng, oracle.run, functools.partial(oracle.run, **decode))
         across = inputs | {"patches": np.array([0, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0])}
         check("patch: a patch over two components", oracle.status(**across, frames=frames) == "error")
+
+
+def check_odd_patch(rng, encode, decode):
+    patches = np.array([-1, 0, 0, -1, 1, 5, 3, 3, 2, -1, 4])  # 0 and 2 in one component; 1, 5 and 3 in another: 1 and 5 share an edge
+    for kind, odd in odd_kinds(rng).items():
+        z = encode(reference=odd.x0, F=odd.F, patches=patches, frames=odd.frames[:1])["z"][0]
+        triangles, rest = z[: 9 * 11].reshape(11, 9), z[9 * 11 :]
+        close(f"patch: {kind}: all triangles turn with their patches", triangles, [[0, 0, 0, 1, 1, 1, 0, 0, 0]] * 11)
+        close(f"patch: {kind}: one adjacent pair, then components", rest[:-6], [0, 0, 0, *odd.placement()[:-6]])
+        close(f"patch: {kind}: further sets by lowest patch", rest[-6:], odd.bends[::-1].ravel())
+    check_odd_decode("patch", encode, decode, rng, patches=patches)
+    check_odd_decode("patch, both fans in one", encode, decode, rng, patches=np.array([-1, 0, 2, -1, 1, 1, 1, 1, 3, -1, 4]))
 
 
 def rotation_vector(R):

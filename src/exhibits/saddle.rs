@@ -9,9 +9,9 @@ use super::{Chart, Exhibit, ExhibitError, Ground, Panel, Style, Table};
 use crate::sequence::Sequence;
 use crate::sequence::dataset::DataFolders;
 use crate::signal::Point;
+use crate::signal::dissimilarities::separation;
 use crate::signal::fit::{Fit, FitOptions, fit};
 use crate::signal::layout::Layout;
-use crate::signal::mds::separation;
 use crate::signal::saddles::{Place, gaussian_curvature, places};
 
 const NAME: &str = "figure-3";

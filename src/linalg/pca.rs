@@ -2,7 +2,7 @@
 
 use faer::linalg::matmul::triangular;
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Scale};
 use rayon::prelude::*;
 
 use super::dense::{FactorError, Qr, multiply, symmetric_eigen, thin_svd};
@@ -43,8 +43,9 @@ pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     if n >= d {
         return by_qr(samples, mean(samples), m);
     }
-    let (gram, mean) = gram(samples);
-    match by_gram(samples, &mean, gram.as_ref(), m)? {
+    // One core touches the memory of the basis while the other multiplies.
+    let (basis, (gram, mean)) = rayon::join(|| Mat::zeros(d, m), || gram(samples));
+    match by_gram(samples, &mean, gram.as_ref(), basis)? {
         Some(pca) => Ok(pca),
         None => by_qr(samples, mean, m),
     }
@@ -146,14 +147,14 @@ fn gram(samples: MatRef<'_, f64>) -> (Mat<f64>, Vec<f64>) {
     (sum.unwrap_or_else(|| Mat::zeros(n, n)), mean)
 }
 
-/// The Gram route, or None where the kept singular values spread too far for it.
+/// The Gram route, or None where the kept singular values spread too far for it. `basis` is d x m, and overwritten.
 fn by_gram(
     samples: MatRef<'_, f64>,
     mean: &[f64],
     gram: MatRef<'_, f64>,
-    m: usize,
+    mut basis: Mat<f64>,
 ) -> Result<Option<Pca>, FactorError> {
-    let n = samples.ncols();
+    let (n, m) = (samples.ncols(), basis.ncols());
     let eigen = symmetric_eigen(gram)?;
     let negligible = negligible(samples, mean, eigen.values.iter().copied());
     let least = (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible);
@@ -162,7 +163,7 @@ fn by_gram(
     }
     let sigma: Vec<f64> = eigen.values.iter().map(|v| v.max(0.0).sqrt()).collect();
     let weights = Mat::from_fn(n, m, |i, j| eigen.vectors[(i, j)] / sigma[j]);
-    let mut basis = centred_product(samples, mean, weights.as_ref());
+    centred_product(samples, mean, weights.as_ref(), basis.as_mut());
     let signs = orient(&mut basis);
     let coordinates = Mat::from_fn(m, n, |j, i| signs[j] * sigma[j] * eigen.vectors[(i, j)]);
     Ok(Some(Pca {
@@ -174,22 +175,21 @@ fn by_gram(
 }
 
 /// Y W for the centred samples Y (d x n) and W (n x m), a block of rows at a time.
-fn centred_product(samples: MatRef<'_, f64>, mean: &[f64], w: MatRef<'_, f64>) -> Mat<f64> {
-    let (d, n) = samples.shape();
-    let mut product = Mat::zeros(d, w.ncols());
-    product
-        .as_mut()
-        .par_row_chunks_mut(BLOCK)
-        .enumerate()
-        .for_each_init(
-            || Mat::zeros(BLOCK, n),
-            |buffer, (block, target)| {
-                let mut rows = buffer.get_mut(..target.nrows(), ..);
-                centred_rows(samples, mean, block * BLOCK, rows.rb_mut());
-                multiply(target, Accum::Replace, rows.rb(), w);
-            },
-        );
-    product
+fn centred_product(
+    samples: MatRef<'_, f64>,
+    mean: &[f64],
+    w: MatRef<'_, f64>,
+    product: MatMut<'_, f64>,
+) {
+    let n = samples.ncols();
+    product.par_row_chunks_mut(BLOCK).enumerate().for_each_init(
+        || Mat::zeros(BLOCK, n),
+        |buffer, (block, target)| {
+            let mut rows = buffer.get_mut(..target.nrows(), ..);
+            centred_rows(samples, mean, block * BLOCK, rows.rb_mut());
+            multiply(target, Accum::Replace, rows.rb(), w);
+        },
+    );
 }
 
 /// The Householder route: Y = Q R and R = U S V^T give Y = (Q U) S V^T.
@@ -223,19 +223,24 @@ fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, Fact
 
 /// Turns each column so that its entry of largest magnitude (the first of equals) is positive; returns the signs applied.
 pub(crate) fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
-    (0..basis.ncols())
-        .map(|j| {
-            let column = basis.col_as_slice_mut(j);
-            let most = max_abs(column);
-            let largest = column.iter().find(|x| x.abs() == most);
-            if largest.is_some_and(|&x| x < 0.0) {
-                column.iter_mut().for_each(|x| *x = -*x);
-                -1.0
-            } else {
-                1.0
-            }
-        })
-        .collect()
+    let sign = |j: usize| {
+        let column = basis.col_as_slice(j);
+        let most = max_abs(column);
+        let largest = column.iter().find(|x| x.abs() == most);
+        if largest.is_some_and(|&x| x < 0.0) {
+            -1.0
+        } else {
+            1.0
+        }
+    };
+    let signs: Vec<f64> = (0..basis.ncols()).into_par_iter().map(sign).collect();
+    let columns = basis.par_col_iter_mut().zip(&signs);
+    columns.for_each(|(mut column, &sign)| {
+        if sign < 0.0 {
+            column *= Scale(sign);
+        }
+    });
+    signs
 }
 
 #[cfg(test)]
@@ -254,7 +259,7 @@ mod tests {
         let whole = pca(samples.as_ref(), 8).unwrap();
         assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
         let (gram, mean) = gram(samples.as_ref());
-        let gram = by_gram(samples.as_ref(), &mean, gram.as_ref(), 4);
+        let gram = by_gram(samples.as_ref(), &mean, gram.as_ref(), Mat::zeros(700, 4));
         let gram = gram.unwrap().unwrap();
         let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
         assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::branches::Neighbours;
 use super::deformation::{Deformation, LANES, Lanes};
+use super::hinges::hinges;
 use super::poisson::{Gradient, Poisson};
 use super::reference::{Reference, check, check_len};
 use super::{ShapeError, Space, SpaceKind};
@@ -51,11 +52,10 @@ impl GradientSpace {
     fn neighbours(&self) -> &Neighbours {
         self.neighbours.get_or_init(|| {
             let topology = Topology::new(self.reference.faces());
-            let sound = |t: u32| self.reference.triangles[t as usize].is_some();
-            let pairs = topology
-                .pairs()
-                .map(|p| [p.first.triangle, p.second.triangle]);
-            let pairs: Vec<_> = pairs.filter(|&[f, g]| sound(f) && sound(g)).collect();
+            let pairs = hinges(&self.reference, &topology);
+            let pairs: Vec<_> = pairs
+                .map(|p| [p.first.triangle, p.second.triangle])
+                .collect();
             Neighbours::new(self.reference.faces().len(), pairs.iter().copied())
         })
     }

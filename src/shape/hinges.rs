@@ -1,11 +1,44 @@
 //! The pairs of triangles across which a surface bends: dihedral angles, and the rotations from triangle to triangle that they and stretches make.
 
-use super::posed::{Stretch, stretched};
+use super::posed::{COLLINEAR, Stretch, stretched};
 use super::reference::{Reference, Triangle};
 use crate::linalg::rotation::Matrix;
-use crate::mesh::dihedral::{dihedral_angle, hinge};
-use crate::mesh::topology::{HalfEdge, Pair};
-use crate::mesh::vector::point;
+use crate::mesh::dihedral::hinge;
+use crate::mesh::topology::{HalfEdge, Pair, Topology};
+use crate::mesh::vector::{Point, cross, dot, norm, point, sub};
+
+/// The pairs of an edge: its lowest triangle that is not degenerate (the lowest of all where all are) with each of the others, in their order.
+pub fn pairs_of<'a>(
+    reference: &Reference,
+    edge: usize,
+    fan: &'a [HalfEdge],
+) -> impl Iterator<Item = Pair> + use<'a> {
+    let sound = |half: &HalfEdge| reference.is_sound(half.triangle);
+    let hub = fan.iter().position(sound).unwrap_or(0);
+    let others = fan.iter().enumerate().filter(move |&(i, _)| i != hub);
+    others.map(move |(_, &second)| Pair {
+        edge: edge as u32,
+        first: fan[hub],
+        second,
+    })
+}
+
+/// Whether neither triangle is degenerate in the reference.
+pub fn is_hinge(reference: &Reference, pair: &Pair) -> bool {
+    [pair.first, pair.second]
+        .iter()
+        .all(|half| reference.is_sound(half.triangle))
+}
+
+/// The pairs of triangles at all edges, edge by edge, that are not degenerate in the reference.
+pub fn hinges<'a>(
+    reference: &'a Reference,
+    topology: &'a Topology,
+) -> impl Iterator<Item = Pair> + 'a {
+    let fans = topology.fans().enumerate();
+    fans.flat_map(|(edge, fan)| pairs_of(reference, edge, fan))
+        .filter(|pair| is_hinge(reference, pair))
+}
 
 /// A pair of triangles that are not degenerate in the reference.
 #[derive(Clone, Copy, Debug)]
@@ -39,9 +72,20 @@ impl Hinge {
         })
     }
 
-    /// The dihedral angle in a frame.
-    pub fn angle(&self, positions: &[f64]) -> f64 {
-        dihedral_angle(self.corners.map(|v| point(positions, v)))
+    /// The dihedral angle in a frame whose triangles have these unit normals, in radians; 0 where the edge has no length. With one normal a triangle the
+    /// angles at its three sides belong together, however thin it is.
+    pub fn angle(&self, positions: &[f64], normals: &[Point]) -> f64 {
+        let [i, j, ..] = self.corners;
+        let edge = sub(point(positions, j), point(positions, i));
+        let length = norm(edge);
+        if length == 0.0 {
+            return 0.0;
+        }
+        let [f, g] = self.triangles.map(|t| normals[t as usize]);
+        let g = g.map(|x| self.side * x);
+        // 0 added, so that flat is +0.
+        let sine = dot(cross(f, g), edge) / length + 0.0;
+        sine.atan2(dot(f, g))
     }
 
     /// C_fg: the axes of g are those of f times it, where the stretches of f and g and the dihedral angle are these. With the edge's directions a in f and b
@@ -78,12 +122,14 @@ fn side_in_plane(t: &Triangle, corner: u8) -> [f64; 2] {
 }
 
 fn direction(stretch: Stretch, edge: [f64; 2]) -> [f64; 2] {
-    unit(stretched(stretch, edge))
-        .or_else(|| unit(edge))
-        .unwrap_or([1.0, 0.0])
-}
-
-fn unit([x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    let length = (x * x + y * y).sqrt();
-    (length > 0.0).then(|| [x / length, y / length])
+    let rounding = COLLINEAR * (stretch[0].abs() + stretch[1].abs());
+    let length = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
+    let mapped = stretched(stretch, edge);
+    let (long, rest) = (length(mapped), length(edge));
+    let [x, y] = mapped;
+    match long > rounding * rest {
+        true => [x / long, y / long],
+        // A reference's edge has a length.
+        false => edge.map(|x| x / rest),
+    }
 }

@@ -1,18 +1,20 @@
-//! Edge lengths and dihedral angles (Winkler et al. 2010, Froehlich & Botsch 2011): d = 2E + 6C where no edge has more than two triangles.
+//! Edge lengths and dihedral angles (Winkler et al. 2010, Froehlich & Botsch 2011): d = 2E + 6C where no edge has more than two triangles
+//! and edges join all triangles of a component.
 //!
-//! An edge's numbers: its length over the mean edge length of the reference; then the dihedral angles of its pairs; then zeros up to two. After all edges
-//! come the six numbers of each component, see [`placement`].
+//! An edge's numbers: its length over the mean edge length of the reference; then the dihedral angles of its pairs ([`super::hinges::pairs_of`]); then zeros up
+//! to two. After all edges come the numbers of components and further parts, see [`super::placement`].
 //!
 //! Decoding starts from the surface that lengths and angles make by linear systems, as in `lric`, which for the vector of a frame is that frame; then
 //! [`shell`](super::shell) descends to the nearest lengths and angles. Edges that only degenerate triangles have, and that join two components, have no say.
+//! A frame in which a triangle's corners lie on a line is where dihedral angles jump: it comes back only as nearly as the descent ends.
 
 use std::sync::Arc;
 
-use super::lric::unwrap_angles;
-use super::placement;
+use super::edge_layout::EdgeLayout;
+use super::placement::triangle_turn;
 use super::pool::Pool;
-use super::posed::{Stretch, UNSTRETCHED, area_of_sides, stretch_of_sides};
-use super::reference::{Reference, check, check_len};
+use super::posed::{Stretch, UNSTRETCHED, area_of_sides, normal, stretch_of_sides};
+use super::reference::{Reference, Triangle, check, check_len};
 use super::shell::{Descent, Shell, Target};
 use super::surface::Surface;
 use super::{ShapeError, Space, SpaceKind};
@@ -33,13 +35,11 @@ pub struct LengthsSpace {
     shell: Shell,
     /// Both ends of every edge, and where its length is.
     edges: Vec<([u32; 2], u32)>,
-    /// Where the lengths of the edges of the shell are, and the angles of the surface's hinges.
+    layout: EdgeLayout,
+    /// Where the lengths of the edges of the shell are.
     lengths: Vec<u32>,
-    angles: Vec<u32>,
     /// Where the lengths of a triangle's sides are, F x 3; none where a corner is repeated.
     sides: Vec<Option<[u32; 3]>>,
-    /// How many numbers the edges have together.
-    edge_numbers: usize,
     /// The mean edge length of the reference.
     unit: f64,
     work: Pool<Work>,
@@ -52,26 +52,23 @@ struct Work {
     angles: Vec<f64>,
     areas: Vec<f64>,
     points: Vec<Point>,
+    normals: Vec<Point>,
 }
 
 impl LengthsSpace {
-    /// Over a reference frame of 3V positions. Costs two sparse factorisations and the analysis of a third.
+    /// Over a reference frame of 3V positions. Costs as [`Surface::new`], and the analysis of the descent's equations.
     pub fn new(connectivity: Arc<Connectivity>, reference: &[f64]) -> Result<Self, ShapeError> {
         let reference = Reference::new(connectivity, reference)?;
         let topology = Topology::new(reference.faces());
         let surface = Surface::new(&reference, &topology)?;
-        let solid = |triangle: u32| reference.triangles[triangle as usize].is_some();
+        let layout = EdgeLayout::new(&reference, &topology, |_| 1, NUMBERS);
+        let edges = topology.edges().iter().copied();
+        let edges: Vec<_> = edges.zip(layout.starts.iter().copied()).collect();
         let mut sides = vec![[None; 3]; reference.faces().len()];
-        let (mut edges, mut angles, mut next) = (Vec::new(), Vec::new(), 0);
-        for (&ends, fan) in topology.edges().iter().zip(topology.fans()) {
-            edges.push((ends, next));
+        for (fan, &start) in topology.fans().zip(&layout.starts) {
             for half in fan {
-                sides[half.triangle as usize][half.corner as usize] = Some(next);
+                sides[half.triangle as usize][half.corner as usize] = Some(start);
             }
-            let pairs = (next + 1..).zip(&fan[1..]);
-            let hinges = pairs.filter(|(_, half)| solid(fan[0].triangle) && solid(half.triangle));
-            angles.extend(hinges.map(|(slot, _)| slot));
-            next += NUMBERS.max(fan.len()) as u32;
         }
         let inside = |(ends, _): &&([u32; 2], u32)| {
             let [a, b] = ends.map(|v| reference.labels[v as usize]);
@@ -90,9 +87,8 @@ impl LengthsSpace {
             surface,
             lengths: held.iter().map(|&(_, slot)| slot).collect(),
             edges,
-            angles,
+            layout,
             sides: sides.into_iter().map(all).collect(),
-            edge_numbers: next as usize,
             reference,
             work: Pool::default(),
         })
@@ -102,18 +98,18 @@ impl LengthsSpace {
     pub fn descend(&self, z: &[f64], positions: &mut [f64]) -> Result<Descent, ShapeError> {
         check("z", z, self.dimension())?;
         check_len("frame", positions, self.frame_len())?;
-        let (edges, placed) = z.split_at(self.edge_numbers);
+        let (edges, placed) = z.split_at(self.layout.numbers);
         self.work.lend(|work| {
             let number = |&slot: &u32| edges[slot as usize];
             work.stretch.clear();
             work.stretch.extend(self.stretches(edges));
-            let angle = |hinge: usize| edges[self.angles[hinge] as usize];
+            let angle = |hinge: usize| edges[self.layout.angles[hinge] as usize];
             self.surface
                 .solve(&self.reference, &work.stretch, angle, placed, positions)?;
             work.lengths.clear();
             work.lengths.extend(self.lengths.iter().map(number));
             work.angles.clear();
-            work.angles.extend(self.angles.iter().map(number));
+            work.angles.extend(self.layout.angles.iter().map(number));
             work.areas.clear();
             work.areas.extend(self.solid_sides().map(|sides| {
                 let lengths = sides.map(|slot| edges[slot as usize].max(0.0));
@@ -133,7 +129,9 @@ impl LengthsSpace {
             if found.factorisations > 0 {
                 let scaled = work.points.as_flattened().iter().map(|x| x * self.unit);
                 positions.iter_mut().zip(scaled).for_each(|(x, y)| *x = y);
-                placement::turn_and_place(&self.reference, placed, positions);
+                self.surface
+                    .placement()
+                    .turn_and_place(&self.reference, placed, positions);
             }
             Ok(found)
         })
@@ -162,7 +160,7 @@ impl Space for LengthsSpace {
     }
 
     fn dimension(&self) -> usize {
-        self.edge_numbers + placement::NUMBERS * self.reference.components.len()
+        self.layout.numbers + self.surface.placement().numbers()
     }
 
     fn frame_len(&self) -> usize {
@@ -172,15 +170,27 @@ impl Space for LengthsSpace {
     fn encode(&self, positions: &[f64], z: &mut [f64]) -> Result<(), ShapeError> {
         check("frame", positions, self.frame_len())?;
         check_len("z", z, self.dimension())?;
-        let (edges, placed) = z.split_at_mut(self.edge_numbers);
+        let (edges, placed) = z.split_at_mut(self.layout.numbers);
         edges.fill(0.0);
         for &(ends, slot) in &self.edges {
             edges[slot as usize] = length(positions, ends) / self.unit;
         }
-        for (&slot, hinge) in self.angles.iter().zip(self.surface.hinges()) {
-            edges[slot as usize] = hinge.angle(positions);
-        }
-        placement::encode(&self.reference, positions, placed);
+        self.work.lend(|work| {
+            let triangles = self.reference.faces().iter().zip(&self.reference.triangles);
+            let normal = |(face, rest): (&[u32; 3], &Option<Triangle>)| match rest {
+                Some(rest) => normal(rest, face.map(|v| point(positions, v))),
+                None => [0.0; 3],
+            };
+            work.normals.clear();
+            work.normals.extend(triangles.map(normal));
+            for (&place, hinge) in self.layout.angles.iter().zip(self.surface.hinges()) {
+                edges[place as usize] = hinge.angle(positions, &work.normals);
+            }
+        });
+        let turn = |t| triangle_turn(&self.reference, positions, t);
+        self.surface
+            .placement()
+            .encode(&self.reference, positions, turn, placed);
         Ok(())
     }
 
@@ -191,8 +201,11 @@ impl Space for LengthsSpace {
 
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {
         if previous.len() == self.dimension() && z.len() == self.dimension() {
-            unwrap_angles(&self.angles, previous, z);
-            placement::unwrap(&previous[self.edge_numbers..], &mut z[self.edge_numbers..]);
+            self.layout.unwrap(previous, z);
+            let end = self.layout.numbers;
+            self.surface
+                .placement()
+                .unwrap(&previous[end..], &mut z[end..]);
         }
     }
 }

@@ -13,6 +13,7 @@
 
 pub mod branches;
 mod deformation;
+pub mod edge_layout;
 pub mod frames;
 pub mod gradient;
 pub mod halfway;

@@ -7,6 +7,12 @@ use super::reference::Triangle;
 use crate::linalg::rotation::{Matrix, plane_polar};
 use crate::mesh::vector::{Point, along, cross, dot, norm, sub};
 
+/// The sine below which a triangle's corners lie on a line.
+pub const COLLINEAR: f64 = 1e-14;
+
+/// A unit vector's part across a line that is no longer than this is rounding.
+const NEARLY_ALONG: f64 = 1e-7;
+
 /// U_11, U_22, U_12.
 pub type Stretch = [f64; 3];
 
@@ -31,16 +37,16 @@ pub fn rest_axes(rest: &Triangle) -> Matrix {
     [rest.u, rest.v, rest.normal()]
 }
 
-/// Measures a triangle with these corners. One without an area faces, of all ways across it, the one nearest to the reference's.
+/// Measures a triangle with these corners. One whose corners lie on a line ([`COLLINEAR`]) faces, of all ways across the longer of its first and last side,
+/// the one nearest to the reference's.
 pub fn posed(rest: &Triangle, [a, b, c]: [Point; 3]) -> Posed {
     let (e1, e2) = (sub(b, a), sub(c, a));
-    let first = unit(e1).or_else(|| unit(e2)).unwrap_or(rest.u);
-    let second = unit(across(e2, first)).unwrap_or_else(|| any_across(rest, first));
+    let [first, second] = plane_axes(rest, e1, e2);
     let polar = plane_polar(plane_map(
         rest,
         dot(e1, first),
         dot(e2, first),
-        dot(e2, second),
+        dot(e2, second).max(0.0),
     ));
     let [cos, sin] = polar.turn;
     let axis = |x: f64, y: f64| std::array::from_fn(|i| x * first[i] + y * second[i]);
@@ -48,6 +54,39 @@ pub fn posed(rest: &Triangle, [a, b, c]: [Point; 3]) -> Posed {
         stretch: polar.stretch,
         axes: [axis(cos, sin), axis(-sin, cos), cross(first, second)],
     }
+}
+
+/// The unit normal of a triangle with these corners, as [`posed`] has it.
+pub fn normal(rest: &Triangle, [a, b, c]: [Point; 3]) -> Point {
+    let [first, second] = plane_axes(rest, sub(b, a), sub(c, a));
+    cross(first, second)
+}
+
+/// Orthonormal axes of the plane of a triangle with these edges.
+#[inline(always)]
+fn plane_axes(rest: &Triangle, e1: Point, e2: Point) -> [Point; 2] {
+    if let Some(first) = unit(e1) {
+        let upright = across(e2, first);
+        let height = norm(upright);
+        if height > COLLINEAR * norm(e2) {
+            return [first, upright.map(|x| x / height)];
+        }
+    }
+    line_axes(rest, e1, e2)
+}
+
+/// The same of one whose corners lie on a line.
+#[cold]
+fn line_axes(rest: &Triangle, e1: Point, e2: Point) -> [Point; 2] {
+    let longer = if norm(e2) > norm(e1) { e2 } else { e1 };
+    let first = unit(longer).unwrap_or(rest.u);
+    // The part of the reference's normal across the line; where it is along the line all ways across are as near.
+    let facing = across(rest.normal(), first);
+    let facing = match norm(facing) > NEARLY_ALONG {
+        true => facing,
+        false => across(rest.u, first),
+    };
+    [first, cross(unit(facing).unwrap_or(rest.v), first)]
 }
 
 /// By columns, the map of the plane that takes (length, 0) and (foot, height) of the reference to (length, 0) and (foot, height).
@@ -84,13 +123,6 @@ fn across(x: Point, axis: Point) -> Point {
     let once = along(x, -dot(x, axis), axis);
     // Once more, because a thin triangle leaves little.
     along(once, -dot(once, axis), axis)
-}
-
-fn any_across(rest: &Triangle, first: Point) -> Point {
-    // One of two orthogonal directions is far from `first`.
-    let [normal, u] = [rest.normal(), rest.u].map(|n| across(n, first));
-    let facing = if norm(normal) > 0.1 { normal } else { u };
-    cross(unit(facing).unwrap_or(rest.v), first)
 }
 
 fn unit(x: Point) -> Option<Point> {

@@ -9,8 +9,9 @@ use crate::mesh::measure::bounds;
 use crate::mesh::topology::components;
 use crate::mesh::vector::{Point, along, cross, dot, norm, point, sub};
 
-/// A triangle with twice its area at most this share of its longest edge squared is degenerate.
-pub const DEGENERATE: f64 = 1e-10;
+/// A triangle with twice its area at most this share of its longest edge squared is degenerate. A frame comes back to rounding over the least such share of
+/// the others, and from lengths to rounding over its square, which tell a height h of a triangle only to eps / h.
+pub const DEGENERATE: f64 = 1e-5;
 
 /// A triangle (a, b, c) of the reference, in its orthonormal frame: b - a = length u, c - a = foot u + height v; the normal is u x v.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +127,11 @@ impl Reference {
     /// The component of a triangle that is not degenerate.
     pub fn component_of(&self, face: usize) -> usize {
         self.labels[self.faces()[face][0] as usize] as usize
+    }
+
+    /// Whether a triangle is not degenerate.
+    pub fn is_sound(&self, face: u32) -> bool {
+        self.triangles[face as usize].is_some()
     }
 
     /// The area of each triangle over the squared diagonal, F; 0 for degenerate ones.

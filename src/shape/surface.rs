@@ -3,8 +3,8 @@
 
 use super::ShapeError;
 use super::frames::Frames;
-use super::hinges::Hinge;
-use super::placement;
+use super::hinges::{Hinge, hinges};
+use super::placement::Placement;
 use super::poisson::Poisson;
 use super::pool::Pool;
 use super::posed::{Stretch, rest_axes};
@@ -18,6 +18,7 @@ pub struct Surface {
     hinges: Vec<Hinge>,
     frames: Frames,
     poisson: Poisson,
+    placement: Placement,
     work: Pool<Work>,
 }
 
@@ -28,16 +29,23 @@ struct Work {
 }
 
 impl Surface {
-    /// Costs two sparse factorisations, of V and of F unknowns.
+    /// Costs a sparse factorisation of V unknowns and the analysis of one of 3F.
     pub fn new(reference: &Reference, topology: &Topology) -> Result<Self, ShapeError> {
         let poisson = Poisson::new(reference)?;
-        let hinges: Vec<_> = topology
-            .pairs()
+        let hinges: Vec<_> = hinges(reference, topology)
             .filter_map(|pair| Hinge::new(reference, &pair))
             .collect();
         let pairs = hinges.iter().map(|h| h.triangles).collect();
+        let frames = Frames::new(reference.faces().len(), pairs)?;
+        let lowest = reference.components.iter().map(|c| c.first_triangle);
+        let component_of = |t| {
+            reference
+                .is_sound(t)
+                .then(|| reference.component_of(t as usize) as u32)
+        };
         Ok(Self {
-            frames: Frames::new(reference.faces().len(), pairs)?,
+            placement: Placement::new(lowest.collect(), frames.roots(), component_of),
+            frames,
             hinges,
             poisson,
             work: Pool::default(),
@@ -49,11 +57,14 @@ impl Surface {
         &self.hinges
     }
 
-    /// The frame in which triangles are stretched like this (any number for degenerate ones), hinges bent like this, and components placed at their six
-    /// numbers, as nearly as can be. Errors as [`Frames::solve`].
-    ///
-    /// Triangles that no chain of hinges joins to the lowest of their component (only a vertex does, or a degenerate triangle) have no rotation of their own in
-    /// these numbers: the lowest of each such part turns from the reference as that of the component does.
+    /// Where components and further parts are; members are triangles.
+    pub fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    /// The frame in which triangles are stretched like this (any number for degenerate ones), hinges bent like this, and components and further parts placed
+    /// at their numbers, as nearly as can be. Costs two sparse solves where hinges and stretches agree, as those of a frame do, and a sparse
+    /// factorisation of 3F unknowns where they do not. Errors as [`Frames::solve`].
     pub fn solve(
         &self,
         reference: &Reference,
@@ -69,13 +80,11 @@ impl Surface {
             });
             work.relative.clear();
             work.relative.extend(turns);
-            let rotations = placement::rotations(placed);
             work.axes.clear();
             work.axes.resize(stretch.len(), IDENTITY);
-            for &root in self.frames.roots() {
+            for (root, turn) in self.placement.turns(placed) {
                 if let Some(rest) = &reference.triangles[root as usize] {
-                    let component = reference.component_of(root as usize);
-                    work.axes[root as usize] = times(&rotations[component], &rest_axes(rest));
+                    work.axes[root as usize] = times(&turn, &rest_axes(rest));
                 }
             }
             self.frames.solve(&work.relative, &mut work.axes)?;
@@ -88,7 +97,7 @@ impl Surface {
                 }
             };
             self.poisson.solve(fill, positions);
-            placement::place(reference, placed, positions);
+            self.placement.place(reference, placed, positions);
             Ok(())
         })
     }

@@ -86,7 +86,8 @@ fn embedded_sequences_come_back() {
     }
 }
 
-/// Three pages at one edge, a triangle apart from them, a vertex of no triangle, and a triangle of no area along a page's side.
+/// Three pages at one edge, a triangle apart from them and one that hangs on it by a vertex, a vertex of no triangle, and a triangle of no area along a
+/// page's side.
 fn odd() -> (Vec<[u32; 3]>, Vec<f64>) {
     let points = [
         [0.0, 0.0, 0.0],
@@ -99,6 +100,8 @@ fn odd() -> (Vec<[u32; 3]>, Vec<f64>) {
         [3.0, 1.0, 0.1],
         [9.0, 9.0, 9.0],
         [0.0, 0.5, 0.0],
+        [3.2, 2.0, 0.4],
+        [2.5, 1.7, -0.3],
     ];
     let faces = vec![
         [0, 1, 2],
@@ -107,6 +110,7 @@ fn odd() -> (Vec<[u32; 3]>, Vec<f64>) {
         [5, 6, 7],
         [0, 9, 1],
         [9, 2, 0],
+        [7, 10, 11],
     ];
     (faces, points.as_flattened().to_vec())
 }
@@ -115,14 +119,56 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
-    fn odd_meshes_come_back(jitter in prop::collection::vec(-0.2f64..0.2, 30)) {
+    /// In whichever order its faces are named.
+    #[test]
+    fn odd_meshes_come_back(jitter in prop::collection::vec(-0.2f64..0.2, 36), order in Just((0..7).collect::<Vec<usize>>()).prop_shuffle()) {
         let (faces, reference) = odd();
+        let faces: Vec<[u32; 3]> = order.iter().map(|&i| faces[i]).collect();
         let frame: Vec<f64> = reference.iter().zip(&jitter).map(|(x, j)| x + j).collect();
         for kind in KINDS {
-            let space = space(kind, &mesh(10, &faces), &reference, &frame);
+            let space = space(kind, &mesh(12, &faces), &reference, &frame);
             // Three components; [0, 9, 1] has no area and no say, so only what its neighbours hold comes back.
             let found = round_trip(&*space, &frame);
             prop_assert!(found < 1e-12, "{kind}: {found}");
+        }
+    }
+
+    /// A triangle of this height over its longest side, in the reference and in the frame: degenerate or not, the frame comes back.
+    #[test]
+    fn thin_triangles_come_back(height in -12.0f64..0.0, foot in 0.01f64..0.99, stretch in 0.8f64..1.2, jitter in prop::collection::vec(-0.2f64..0.2, 15)) {
+        let height = 10f64.powf(height);
+        let cap = |stretch: f64| vec![
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, foot, stretch * height, 0.0, 0.5, -1.0, 0.3, 0.4, 0.9, 0.2,
+        ];
+        let faces = [[0, 1, 2], [1, 0, 3], [1, 4, 2], [2, 4, 0]];
+        let (reference, mut frame) = (cap(1.0), cap(stretch));
+        for i in [0, 1, 3, 4].map(|v| 3 * v) {
+            // The thin one keeps its height, the others move.
+            let by = if i < 9 { 0.0 } else { 1.0 };
+            (0..3).for_each(|a| frame[i + a] += by * jitter[i + a]);
+        }
+        for (kind, most) in [
+            (SpaceKind::Gradient, 1e-10), (SpaceKind::Lric, 1e-10), (SpaceKind::Patch, 1e-10), (SpaceKind::Lengths, 1e-8),
+        ] {
+            let space = space(kind, &mesh(5, &faces), &reference, &frame);
+            let found = round_trip(&*space, &frame);
+            prop_assert!(found < most, "{kind} {height:e}: {found}");
+        }
+    }
+
+    /// Whole frames that move rigidly leave the numbers of a further part as they are.
+    #[test]
+    fn a_part_that_hangs_on_a_vertex_turns_with_its_component(jitter in prop::collection::vec(-0.2f64..0.2, 36), axis in prop::array::uniform3(-1.0f64..1.0)) {
+        let (faces, reference) = odd();
+        let frame: Vec<f64> = reference.iter().zip(&jitter).map(|(x, j)| x + j).collect();
+        let turn = Rotation3::new(Vector3::from(axis));
+        let other = moved(&frame, &turn, Vector3::new(1.0, -2.0, 0.5));
+        for kind in [SpaceKind::Lric, SpaceKind::Lengths] {
+            let space = space(kind, &mesh(12, &faces), &reference, &frame);
+            let [a, b] = [&frame, &other].map(|f| encode_all(&*space, f).unwrap());
+            let part = space.dimension() - 3..space.dimension();
+            let [a, b] = [&a, &b].map(|z| &z.col_as_slice(0)[part.clone()]);
+            prop_assert!(worst(a, b) < 1e-12, "{kind}: {a:?} {b:?}");
         }
     }
 
@@ -160,6 +206,56 @@ proptest! {
                 }
             }
         }
+    }
+}
+
+/// A strip whose middle triangle, and a grid whose first, lie on a line in the frame.
+#[test]
+fn triangles_without_area_in_a_frame_come_back() {
+    let strip = [
+        0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.1, 2.0, 0.0, 0.3, 2.0, 1.0, 0.2,
+    ];
+    let faces = [[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]];
+    let mut frame = strip.to_vec();
+    for (v, to) in [
+        (3, [2.0, -1.0, 0.0]),
+        (4, [3.1, 0.2, 0.8]),
+        (5, [2.9, 0.9, -0.4]),
+    ] {
+        frame[3 * v..3 * v + 3].copy_from_slice(&to);
+    }
+    for turn in [0.0, 1.0] {
+        let frame = moved(
+            &frame,
+            &Rotation3::new(Vector3::new(0.3, -0.8, 0.5) * turn),
+            Vector3::zeros(),
+        );
+        for order in [[0, 1, 2, 3], [1, 0, 2, 3], [3, 2, 1, 0]] {
+            let faces = order.map(|i| faces[i]);
+            for kind in [SpaceKind::Gradient, SpaceKind::Lric, SpaceKind::Patch] {
+                let space = space(kind, &mesh(6, &faces), &strip, &frame);
+                let found = round_trip(&*space, &frame);
+                assert!(found < 1e-12, "{kind} {order:?} {turn}: {found}");
+            }
+        }
+    }
+}
+
+/// Folded by a little more than half a turn one way and a little less the other: halfway is folded by half a turn, not flat.
+#[test]
+fn halfway_does_not_open_a_fold() {
+    let faces = [[0, 1, 2], [1, 0, 3]];
+    let fold = |angle: f64| {
+        let (sin, cos) = angle.sin_cos();
+        vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.0, 0.5, -cos, -sin]
+    };
+    let (start, end) = (fold(3.1), fold(-3.1));
+    for kind in [SpaceKind::Lric, SpaceKind::Lengths] {
+        let space = space(kind, &mesh(4, &faces), &fold(0.0), &start);
+        let found = super::halfway::halfway(&*space, &start, &end).unwrap();
+        let gap =
+            Vector3::from_column_slice(&found[6..9]) - Vector3::from_column_slice(&found[9..]);
+        assert!(gap.norm() < 1e-6, "{kind}: {found:?}");
     }
 }
 
@@ -234,7 +330,7 @@ fn a_roll_rolls_by_half() {
 fn what_does_not_fit_is_refused() {
     let (faces, reference) = odd();
     for kind in KINDS {
-        let space = space(kind, &mesh(10, &faces), &reference, &[]);
+        let space = space(kind, &mesh(12, &faces), &reference, &[]);
         let mut z = vec![0.0; space.dimension()];
         assert!(space.encode(&reference[3..], &mut z).is_err());
         assert!(space.encode(&reference, &mut z[1..]).is_err());

@@ -72,10 +72,10 @@ impl<'a> CubicSpline<'a> {
         Self { values, bends }
     }
 
-    /// c(t) into `point` (d numbers) for a frame time t in [1, n]; beyond the ends the end frames hold.
+    /// c(t) into `point` (d numbers) for a frame time t in [1, n]; beyond the ends the end frames hold, and for NaN the first.
     pub fn evaluate_into(&self, t: f64, point: &mut [f64]) {
         let n = self.values.ncols();
-        let t = t.clamp(1.0, n.max(1) as f64);
+        let t = t.clamp(1.0, n.max(1) as f64).max(1.0);
         let i = (t.floor() as usize - 1).min(n.saturating_sub(2));
         let next = (i + 1).min(n.saturating_sub(1));
         let v = t - 1.0 - i as f64;

@@ -6,6 +6,7 @@ use thiserror::Error;
 use super::Point;
 use super::g::{PoseError, PoseSignal};
 use super::h::shape_signal;
+use super::parameters::Grid;
 use super::psi::{Representation, TimeSignal};
 use super::resample::MOST_FRAMES;
 use super::sites::site_order;
@@ -124,9 +125,12 @@ fn check(poses: usize, places: &[Point], options: &DesignOptions) -> Result<(), 
 
 fn time_signal(sketch: &Sketch, options: &DesignOptions) -> TimeSignal {
     let steps = options.frames - usize::from(!options.closed);
-    let at = |i: usize| sketch.parameter(i as f64 / steps as f64);
+    let spline = sketch.spline().clone();
+    // On the grid of the knots, so that edits leave what is far from them as it is.
+    let grid = Grid::of(&spline.knots);
+    let at = |i: usize| grid.round(sketch.parameter(i as f64 / steps as f64));
     let parameters = (0..options.frames).map(at).collect();
-    TimeSignal::new(sketch.spline().clone(), parameters)
+    TimeSignal::new(spline, parameters)
 }
 
 #[cfg(test)]

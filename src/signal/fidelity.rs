@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use faer::MatRef;
 
-use super::fit::{Attempt, Base, FEWEST_FRAMES, Fit, FitError, error_h};
+use super::fit::{Attempt, Base, FEWEST_FRAMES, Fit, FitError, error_h, timed};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::KnotRule;
 use super::layout::Layout;
@@ -139,7 +139,8 @@ fn least_l_and_k(
     most: f64,
     rule: KnotRule,
 ) -> Result<Option<Attempt>, FitError> {
-    let order = base.order(usize::MAX)?;
+    let (order, searching) = timed(|| base.order(usize::MAX));
+    let order = order?;
     let mut best: Option<(usize, Attempt)> = None;
     let mut tried = 0;
     for share in SHARES {
@@ -150,12 +151,10 @@ fn least_l_and_k(
             continue;
         }
         tried = l;
-        if let Some((k, mut attempt)) = least_k(base, &order.order[..l], most, rule)? {
+        if let Some((k, attempt)) = least_k(base, &order.order[..l], most, rule)? {
             let numbers = l * (base.dimension() + 2) + 3 * k;
             if best.as_ref().is_none_or(|(least, _)| numbers < *least) {
-                attempt.sites.order = order.order[..l].to_vec();
-                attempt.sites.errors = order.errors.clone();
-                best = Some((numbers, attempt));
+                best = Some((numbers, attempt.from_search(&order, l, searching)));
             }
         }
     }

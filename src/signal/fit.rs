@@ -14,7 +14,7 @@ use super::h::{ShapeSignal, shape_signal};
 use super::knots::{KnotError, KnotRule, knots};
 use super::layout::{Distances, Layout, LayoutError};
 use super::mds::Steps;
-use super::parameters::{Grid, centripetal, distinct};
+use super::parameters::{Grid, distinct, frame_parameters};
 use super::pins::{Pin, PinError, check_distance, validate_pins};
 use super::poses::{diameter, first_of_each};
 use super::psi::{Representation, TimeSignal};
@@ -29,8 +29,6 @@ const SAME_POSE: f64 = 1e-4;
 const UNSTABLE: f64 = 8.0;
 /// Wider poses tried then, as shares of the diameter.
 const WIDER_POSES: [f64; 9] = [1e-4, 1e-3, 0.005, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15];
-/// A step of less than this share of the diameter is no step: the square root of the centripetal rule would make 1e-16 of rounding 1e-8.
-const HELD: f64 = 1e-9;
 
 /// What to fit with. Ranges: 4 <= k <= n + 2, 3 <= l <= n, 0 <= m <= n - 1 (section 3.4).
 #[derive(Clone, Debug, PartialEq)]
@@ -162,7 +160,7 @@ impl Fit {
 }
 
 /// Runs something and takes its time.
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let start = Instant::now();
     let result = work();
     (result, start.elapsed())
@@ -467,8 +465,7 @@ impl Base {
         let plane = self.plane();
         let t = distinct(&plane.parameters);
         let mut u = knots(&t, k.min(t.len() + 2), rule)?;
-        let grid = Grid::new(t[t.len() - 1]);
-        u.iter_mut().for_each(|u| *u = grid.round(*u));
+        Grid::of(&t).round_all(&mut u);
         let fitted = Spline::fit_with_values(&plane.parameters, &plane.positions, &u)?;
         Ok(fitted)
     }
@@ -505,22 +502,15 @@ pub(super) struct Attempt {
     timings: Timings,
 }
 
-/// Centripetal parameters of positions whose held poses stand still exactly; where all poses coincide every parameter would be 0, and the
-/// frame number serves instead.
-fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
-    let mut still = positions.to_vec();
-    for i in 1..still.len() {
-        if super::distance(still[i], still[i - 1]) <= HELD * diameter {
-            still[i] = still[i - 1];
-        }
-    }
-    let mut t = centripetal(&still);
-    let grid = Grid::new(t.last().copied().unwrap_or(0.0));
-    t.iter_mut().for_each(|t| *t = grid.round(*t));
-    if distinct(&t).len() > 1 {
-        t
-    } else {
-        (0..positions.len()).map(|i| i as f64).collect()
+impl Attempt {
+    /// The same, said to have the first l sites of a search that took this long.
+    pub(super) fn from_search(mut self, searched: &SiteOrder, l: usize, g: Duration) -> Self {
+        self.sites = SiteOrder {
+            order: searched.order[..l].to_vec(),
+            errors: searched.errors.clone(),
+        };
+        self.timings.g = g;
+        self
     }
 }
 

@@ -17,7 +17,8 @@ use faer::{Mat, MatRef};
 use thiserror::Error;
 
 use super::Point;
-use super::mds::{Dissimilarities, Steps, scale_counting};
+use super::dissimilarities::Dissimilarities;
+use super::mds::{Steps, scale_counting};
 use super::pins::{Pin, moved_onto, principal_start};
 use crate::linalg::dense::{FactorError, symmetric_eigen};
 

@@ -28,6 +28,7 @@
 mod basis;
 pub mod cubic;
 pub mod design;
+pub mod dissimilarities;
 pub mod edit;
 pub mod edits_toml;
 pub mod f;
@@ -54,6 +55,7 @@ pub mod saddles;
 pub mod sites;
 pub mod sketch;
 mod strand;
+pub mod stress;
 pub mod thin_plate;
 pub mod transfer;
 pub mod windows;

@@ -2,6 +2,9 @@
 
 use super::Point;
 
+/// A step of less than this share of the diameter is no step: the square root of the centripetal rule would make 1e-16 of rounding 1e-8.
+const HELD: f64 = 1e-9;
+
 /// Centripetal parameters (Lee 1989, exponent 1/2): t_1 = 0, t_{i+1} = t_i + ||p_{i+1} - p_i||^(1/2). Held poses repeat a parameter.
 pub fn centripetal(points: &[Point]) -> Vec<f64> {
     let mut t = 0.0;
@@ -44,12 +47,45 @@ impl Grid {
         }
     }
 
+    /// The grid of a signal with these non-decreasing parameters.
+    pub fn of(parameters: &[f64]) -> Self {
+        Self::new(parameters.last().copied().unwrap_or(0.0))
+    }
+
+    /// What its numbers are multiples of.
+    pub fn quantum(&self) -> f64 {
+        self.quantum
+    }
+
     /// The nearest number on the grid.
     pub fn round(&self, x: f64) -> f64 {
         if self.quantum < f64::MIN_POSITIVE || !self.quantum.is_finite() {
             return x;
         }
         (x / self.quantum).round() * self.quantum
+    }
+
+    /// All of them.
+    pub fn round_all(&self, numbers: &mut [f64]) {
+        numbers.iter_mut().for_each(|x| *x = self.round(*x));
+    }
+}
+
+/// Centripetal parameters of positions whose held poses stand still exactly; where all poses coincide every parameter would be 0, and the
+/// frame number serves instead.
+pub(super) fn frame_parameters(positions: &[Point], diameter: f64) -> Vec<f64> {
+    let mut still = positions.to_vec();
+    for i in 1..still.len() {
+        if super::distance(still[i], still[i - 1]) <= HELD * diameter {
+            still[i] = still[i - 1];
+        }
+    }
+    let mut t = centripetal(&still);
+    Grid::of(&t).round_all(&mut t);
+    if distinct(&t).len() > 1 {
+        t
+    } else {
+        (0..positions.len()).map(|i| i as f64).collect()
     }
 }
 

@@ -45,21 +45,24 @@ pub enum PinError {
 /// Pins farther away than so many extents of the shape coordinates are a mistake.
 const FAR: f64 = 1e6;
 
-/// An error where a pin is not among the shape coordinates (m x n). O(m n).
+/// An error where a pin is not among the shape coordinates (m x n), whose extent counts 1 where they are all 0. O(m n).
 pub(super) fn check_distance(pins: &[Pin], coordinates: MatRef<'_, f64>) -> Result<(), PinError> {
     if pins.is_empty() {
         return Ok(());
     }
     let columns = coordinates.col_iter();
-    let extent = columns.map(|x| x.norm_l2()).fold(0.0, f64::max);
+    let extent = match columns.map(|x| x.norm_l2()).fold(0.0, f64::max) {
+        0.0 => 1.0,
+        extent => extent,
+    };
     let far = |pin: &&Pin| pin.position[0].hypot(pin.position[1]) > FAR * extent;
     match pins.iter().find(far) {
-        Some(pin) if extent > 0.0 => Err(PinError::TooFar {
+        Some(pin) => Err(PinError::TooFar {
             frame: pin.frame + 1,
             position: pin.position,
             extent,
         }),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 

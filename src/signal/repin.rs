@@ -7,8 +7,10 @@
 use faer::Mat;
 
 use super::Point;
-use super::mds::{Dissimilarities, Layout, Problem, Slope, Steps, VANISHED, free_first};
+use super::dissimilarities::Dissimilarities;
+use super::mds::{Steps, VANISHED, free_first, minimise};
 use super::pins::{Pin, PinError, validate_pins};
+use super::stress::{Places, Problem, Slope};
 use crate::linalg::dense::Cholesky;
 use crate::linalg::kernels::{axpy, dot, norm_squared};
 
@@ -82,11 +84,11 @@ impl Scaling {
         let prepared = self.prepared.take().unwrap_or_else(|| self.prepare());
         let Prepared { order, problem } = &prepared;
         let mut steps = Steps::default();
-        let layout = Layout::of(order, &self.positions);
+        let layout = Places::of(order, &self.positions);
         match self.newton(problem, layout, &mut steps) {
             Some(layout) => layout.write(&order[..problem.free], &mut self.positions),
             None => {
-                let more = problem.minimise(order, &mut self.positions);
+                let more = minimise(problem, order, &mut self.positions);
                 steps.majorising += more.majorising;
                 steps.newton += more.newton;
                 steps.inner += more.inner;
@@ -111,9 +113,9 @@ impl Scaling {
     fn newton(
         &mut self,
         problem: &Problem,
-        mut layout: Layout,
+        mut layout: Places,
         steps: &mut Steps,
-    ) -> Option<Layout> {
+    ) -> Option<Places> {
         let mut slope = problem.slope(&layout);
         for _ in 0..NEWTON_STEPS {
             let norm = norm_squared(&slope.gradient).sqrt();
@@ -147,7 +149,7 @@ impl Scaling {
 /// The Newton step, by preconditioned conjugate gradients; None at a direction of negative curvature or where the factor does not help.
 fn step(
     problem: &Problem,
-    layout: &Layout,
+    layout: &Places,
     slope: &Slope,
     factor: &Cholesky,
     target: f64,
@@ -184,7 +186,7 @@ fn step(
 }
 
 /// The lower triangle of the Hessian of half the stress, shifted; all x before all y. O(n^2).
-fn hessian(problem: &Problem, layout: &Layout) -> Mat<f64> {
+fn hessian(problem: &Problem, layout: &Places) -> Mat<f64> {
     let (n, f) = (problem.delta.len(), problem.free);
     let mut h = Mat::zeros(2 * f, 2 * f);
     for i in 0..f {
@@ -220,8 +222,9 @@ fn hessian(problem: &Problem, layout: &Layout) -> Mat<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mds::{scale, stress};
+    use super::super::mds::scale;
     use super::super::pins::principal_start;
+    use super::super::stress::stress;
     use super::*;
     use proptest::prelude::*;
 
@@ -346,7 +349,7 @@ mod tests {
     fn the_factored_hessian_is_the_one_that_is_multiplied_with() {
         let (scaling, _) = scaling(20, &[2, 11, 12]);
         let Prepared { order, problem } = scaling.prepare();
-        let layout = Layout::of(&order, scaling.positions());
+        let layout = Places::of(&order, scaling.positions());
         let h = hessian(&problem, &layout);
         let size = 2 * problem.free;
         for c in 0..size {

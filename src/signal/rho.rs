@@ -23,10 +23,10 @@ impl Rho {
         &self.slopes
     }
 
-    /// rho(t) for a frame time t in [1, n]; beyond the ends the end values hold.
+    /// rho(t) for a frame time t in [1, n]; beyond the ends the end values hold, and for NaN the first.
     pub fn evaluate(&self, t: f64) -> f64 {
         let n = self.values.len();
-        if n < 2 || t <= 1.0 {
+        if n < 2 || t <= 1.0 || t.is_nan() {
             return self.values.first().copied().unwrap_or(0.0);
         }
         if t >= n as f64 {

@@ -52,7 +52,7 @@ pub fn places(fit: &Fit) -> Vec<Place> {
     let frames: Vec<&[f64]> = (0..n).map(|i| fit.coordinates.col_as_slice(i)).collect();
     let steps: Vec<f64> = frames
         .windows(2)
-        .map(|w| super::mds::separation(w[0], w[1]))
+        .map(|w| super::dissimilarities::separation(w[0], w[1]))
         .collect();
     let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
     let witness = CubicSpline::new(x, Ends::Natural).midpoints();
@@ -61,7 +61,7 @@ pub fn places(fit: &Fit) -> Vec<Place> {
     let mut away = |time: f64, from: &[f64]| {
         let point = fit.representation.time.evaluate(time);
         fit.representation.pose.evaluate_into(point, &mut value);
-        super::mds::separation(&value, from)
+        super::dissimilarities::separation(&value, from)
     };
     let errors: Vec<f64> = (0..n).map(|i| away((i + 1) as f64, frames[i])).collect();
     (0..steps.len())

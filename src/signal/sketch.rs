@@ -6,7 +6,7 @@ use super::Point;
 use super::basis::{Basis, apply};
 use super::f::{Spline, SplineError};
 use super::knots::{KnotError, KnotRule, knots};
-use super::parameters::{centripetal, distinct};
+use super::parameters::{Grid, centripetal};
 
 /// Points taken again on each side of a closed curve: the end conditions of an interpolating cubic spline fade at least by half from knot to knot.
 const WRAPPED: usize = 44;
@@ -47,8 +47,8 @@ pub struct Sketch {
 }
 
 impl Sketch {
-    /// The natural cubic spline through the points, or the periodic one where the curve closes, over centripetal parameters. Points equal to the one
-    /// before are left out, and so is a last point of a closed curve that repeats the first. O(points).
+    /// The natural cubic spline through the points, or the periodic one where the curve closes, over centripetal parameters on their [`Grid`]. Points
+    /// that these do not tell from the one before are left out, and so is a last point of a closed curve that repeats the first. O(points).
     pub fn new(points: &[Point], closed: bool) -> Result<Self, SketchError> {
         let bad = points.iter().position(|p| !p.iter().all(|x| x.is_finite()));
         if let Some(i) = bad {
@@ -56,17 +56,17 @@ impl Sketch {
             return Err(SketchError::NotFinite { point, position });
         }
         let mut points = points.to_vec();
-        points.dedup();
         while closed && points.len() > 1 && points.first() == points.last() {
             points.pop();
         }
+        let (points, parameters, period) = told_apart(&points, closed);
         let (least, found) = (if closed { 3 } else { 2 }, points.len());
         if found < least {
             return Err(SketchError::TooFew { least, found });
         }
         let spline = match closed {
-            false => natural(&points)?,
-            true => periodic(&points)?,
+            false => natural(&points, &parameters, &Grid::new(period))?,
+            true => periodic(&points, &parameters, period)?,
         };
         Ok(Self {
             lengths: lengths(&spline),
@@ -111,21 +111,42 @@ impl Sketch {
     }
 }
 
-fn natural(points: &[Point]) -> Result<Spline, SketchError> {
-    let t = centripetal(points);
-    let u = knots(&distinct(&t), t.len() + 2, KnotRule::Symmetric)?;
-    Ok(Spline::fit(&t, points, &u)?)
+/// The points whose parameters on the grid differ from those before, these parameters, and the last one, where a closed curve is back at its first point.
+fn told_apart(points: &[Point], closed: bool) -> (Vec<Point>, Vec<f64>, f64) {
+    let mut around = points.to_vec();
+    around.extend(points.first().filter(|_| closed));
+    let mut t = centripetal(&around);
+    Grid::of(&t).round_all(&mut t);
+    let period = t.last().copied().unwrap_or(0.0);
+    let apart = |i: &usize| (*i == 0 || t[*i] > t[*i - 1]) && (!closed || t[*i] < period);
+    let kept: Vec<usize> = (0..points.len()).filter(apart).collect();
+    let points = kept.iter().map(|&i| points[i]).collect();
+    (points, kept.iter().map(|&i| t[i]).collect(), period)
+}
+
+fn natural(points: &[Point], t: &[f64], grid: &Grid) -> Result<Spline, SketchError> {
+    let mut u = knots(t, t.len() + 2, KnotRule::Symmetric)?;
+    grid.round_all(&mut u);
+    Ok(Spline::fit(t, points, &u)?)
 }
 
 /// One period of the natural spline through many of them.
-fn periodic(points: &[Point]) -> Result<Spline, SketchError> {
+fn periodic(points: &[Point], t: &[f64], period: f64) -> Result<Spline, SketchError> {
     let n = points.len();
-    let at = |i: usize| points[(i + n * WRAPPED - WRAPPED) % n];
-    let many: Vec<Point> = (0..n + 1 + 2 * WRAPPED).map(at).collect();
-    let whole = natural(&many)?;
+    let index = |i: usize| i + n * WRAPPED - WRAPPED;
+    let count = n + 1 + 2 * WRAPPED;
+    let many: Vec<Point> = (0..count).map(|i| points[index(i) % n]).collect();
+    let first = index(0) / n;
+    // Sums on the grid of one period, which are exact.
+    let turns = |i: usize| (index(i) / n - first) as f64 * period;
+    let parameters: Vec<f64> = (0..count).map(|i| t[index(i) % n] + turns(i)).collect();
+    let start = parameters[0];
+    let parameters: Vec<f64> = parameters.iter().map(|t| t - start).collect();
+    let whole = natural(&many, &parameters, &Grid::new(period))?;
+    let knots = &whole.knots[WRAPPED..WRAPPED + n + 5];
     Ok(Spline {
         control: whole.control[WRAPPED..WRAPPED + n + 3].to_vec(),
-        knots: whole.knots[WRAPPED..WRAPPED + n + 5].to_vec(),
+        knots: knots.iter().map(|u| u - knots[2]).collect(),
     })
 }
 

@@ -3,7 +3,7 @@
 //! Each control point of a cubic B-spline goes with the middle knot of its basis function. A cut between two frames parts these pairs in two, and
 //! joining pieces is joining their lists: the curve is then as smooth across the seam as it is anywhere, it blends within three knots of the seam,
 //! and beyond that it is the curve of the pieces. Pieces move along the parameter by sums that are exact on the grid of
-//! [`super::parameters::Grid`], so that frames away from a seam keep their bits.
+//! [`super::parameters::Grid`], on which new beads and frames are put too, so that frames away from a seam keep their bits, also in edits to come.
 
 use std::ops::Range;
 
@@ -11,6 +11,7 @@ use super::Point;
 use super::basis::Basis;
 use super::f::Spline;
 use super::insert::{InsertError, insert_knots, multiplicity};
+use super::parameters::Grid;
 
 /// Knots beyond a cut on which the curve up to the cut depends.
 const MARGIN: usize = 3;
@@ -212,21 +213,22 @@ impl Piece {
         self
     }
 
-    fn shifted(mut self, by: f64) -> Self {
+    /// With every parameter x at `to(x)`, which must not decrease.
+    fn placed(mut self, to: impl Fn(f64) -> f64) -> Self {
         let [before, behind] = &mut self.margins;
         for beads in [&mut self.beads, &mut before.beads, &mut behind.beads] {
-            beads.iter_mut().for_each(|bead| bead.0 += by);
+            beads.iter_mut().for_each(|bead| bead.0 = to(bead.0));
         }
-        self.frames.iter_mut().for_each(|mark| mark.0 += by);
+        self.frames.iter_mut().for_each(|mark| mark.0 = to(mark.0));
         for margin in &mut self.margins {
-            margin.outer += by;
+            margin.outer = to(margin.outer);
         }
-        (self.from, self.to) = (self.from + by, self.to + by);
+        (self.from, self.to) = (to(self.from), to(self.to));
         self
     }
 
     /// Takes the next piece at its end.
-    fn extend(&mut self, next: Piece, seam: Seam, steps: &Steps) {
+    fn extend(&mut self, next: Piece, seam: Seam, shifts: &Shifts) {
         let left = self.frames.last().map_or(self.to, |mark| mark.0);
         let right = next.frames.first().map_or(next.from, |mark| mark.0);
         let brought = (self.to - left) + (right - next.from);
@@ -237,13 +239,13 @@ impl Piece {
                 (way * (frames + 1) as f64).sqrt().max(brought)
             }
         };
-        let gap = if wanted > 0.0 { wanted } else { steps.mean };
-        let shift = steps.up(self.to + (gap - brought) - next.from);
-        let next = next.shifted(shift);
+        let gap = if wanted > 0.0 { wanted } else { shifts.mean };
+        let shift = shifts.up(self.to + (gap - brought) - next.from);
+        let next = next.placed(|x| shifts.round(x + shift));
         if let Seam::Across { frames } = seam {
             let right = next.frames.first().map_or(next.from, |mark| mark.0);
             let step = (right - left) / (frames + 1) as f64;
-            let between = (1..=frames).map(|j| (left + j as f64 * step, None));
+            let between = (1..=frames).map(|j| (shifts.round(left + j as f64 * step), None));
             self.frames.extend(between);
         }
         self.frames.extend(next.frames);
@@ -270,28 +272,40 @@ impl Piece {
 }
 
 /// How far pieces are moved.
-struct Steps {
+struct Shifts {
     /// Where the centripetal rule gives nothing.
     mean: f64,
     /// Sums of multiples of this are exact.
     quantum: f64,
 }
 
-impl Steps {
+impl Shifts {
     fn new(strand: &Strand) -> Self {
-        let parameters = strand.frames.iter().map(|mark| &mark.0);
-        let all = strand.spline.knots.iter().chain(parameters);
+        let parameters = strand.frames.iter().map(|mark| mark.0);
+        let all = strand.spline.knots.iter().copied().chain(parameters);
+        let greatest = all.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
+        // New parameters have room between the old ones, whatever bits these happen to need.
+        let finest = Grid::new(greatest).quantum();
         Self {
             mean: strand.mean_step(),
-            quantum: all.map(|&x| lowest_bit(x)).fold(f64::INFINITY, f64::min),
+            quantum: all.map(lowest_bit).fold(finest, f64::min),
         }
     }
 
     /// The multiple of the quantum at or above x; x itself where numbers have more bits than that.
     fn up(&self, x: f64) -> f64 {
+        self.whole(x, f64::ceil)
+    }
+
+    /// The nearest multiple of the quantum, likewise.
+    fn round(&self, x: f64) -> f64 {
+        self.whole(x, f64::round)
+    }
+
+    fn whole(&self, x: f64, to_whole: fn(f64) -> f64) -> f64 {
         let units = x / self.quantum;
         if units.abs() < 2f64.powi(52) {
-            units.ceil() * self.quantum
+            to_whole(units) * self.quantum
         } else {
             x
         }
@@ -317,10 +331,10 @@ pub(super) fn join(
     first: Piece,
     rest: Vec<(Seam, Piece)>,
 ) -> Result<Strand, InsertError> {
-    let steps = Steps::new(whole);
+    let shifts = Shifts::new(whole);
     let mut joined = first;
     for (seam, piece) in rest {
-        joined.extend(piece, seam, &steps);
+        joined.extend(piece, seam, &shifts);
     }
     joined.strand()
 }

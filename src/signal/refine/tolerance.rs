@@ -7,7 +7,7 @@ use faer::MatRef;
 use super::rows::Rows;
 use super::{RefineOptions, Refinement, minimise_until, refine_within};
 use crate::signal::fidelity::{Whole, check, choose, leading, least, least_m};
-use crate::signal::fit::{Attempt, Base, Fit, FitError, error_h};
+use crate::signal::fit::{Attempt, Base, Fit, FitError, error_h, timed};
 use crate::signal::h::ShapeSignal;
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
@@ -108,7 +108,8 @@ struct Search<'a> {
 impl Search<'_> {
     /// Of the greatest k the least l, and then the least k; None where no l will do.
     fn fewest(&self) -> Result<Option<Attempt>, FitError> {
-        let order = self.base.order(usize::MAX)?;
+        let (order, searching) = timed(|| self.base.order(usize::MAX));
+        let order = order?;
         let most_k = self.base.most_control_points();
         let with = |k: usize, l: usize| self.attempt(k, &order.order[..l]);
         let fewest_sites = order.order.len().min(3);
@@ -116,11 +117,7 @@ impl Search<'_> {
             return Ok(None);
         };
         let found = least(4, most_k, |k| with(k, l))?;
-        Ok(found.map(|(_, mut attempt)| {
-            attempt.sites.order = order.order[..l].to_vec();
-            attempt.sites.errors = order.errors.clone();
-            attempt
-        }))
+        Ok(found.map(|(_, attempt)| attempt.from_search(&order, l, searching)))
     }
 
     /// The signals as section 3 finds them, where refining takes them below the error.

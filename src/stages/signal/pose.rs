@@ -3,9 +3,10 @@
 use super::super::{Call, StageError, call};
 use super::same_count;
 use crate::arrays::{Array, Bundle};
+use crate::signal::dissimilarities::Dissimilarities;
 use crate::signal::g::PoseSignal;
 use crate::signal::layout::{Distances, Layout};
-use crate::signal::mds::{Dissimilarities, scale};
+use crate::signal::mds::scale;
 use crate::signal::pins::{Pin, validate_pins};
 use crate::signal::sites::site_order;
 
