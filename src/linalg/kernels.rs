@@ -52,6 +52,38 @@ macro_rules! vectorised_wider {
 }
 pub(crate) use vectorised_wider;
 
+/// Compiles a body whose products are fused with sums (`f64::mul_add`, rounded once) for AVX-512, for AVX2, and for the baseline, where a function call
+/// takes the place of the instruction: slow, but the same bits.
+macro_rules! fused {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+        $(#[$doc])*
+        #[inline]
+        $vis fn $name($($arg: $type),*) {
+            #[inline(always)]
+            fn body($($arg: $type),*) $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
+                fn wider($($arg: $type),*) { body($($arg),*) }
+                #[target_feature(enable = "avx2,fma")]
+                fn wide($($arg: $type),*) { body($($arg),*) }
+                if std::arch::is_x86_feature_detected!("fma") {
+                    if $crate::linalg::kernels::has_avx512() {
+                        // SAFETY: the processor has just been seen to have these instructions.
+                        return unsafe { wider($($arg),*) };
+                    }
+                    if std::arch::is_x86_feature_detected!("avx2") {
+                        // SAFETY: as above.
+                        return unsafe { wide($($arg),*) };
+                    }
+                }
+            }
+            body($($arg),*)
+        }
+    };
+}
+pub(crate) use fused;
+
 /// Whether the processor has the instructions that `vectorised_wider` asks for.
 #[cfg(target_arch = "x86_64")]
 #[inline]
@@ -179,6 +211,37 @@ pub fn combine<'a>(a: &[f64], x: impl Fn(usize) -> &'a [f64], y: &mut [f64]) {
     }
     for (j, &a) in a.iter().enumerate().skip(whole) {
         axpy(a, x(j), y);
+    }
+}
+
+fused! {
+    /// y += a_0 x_0 + a_1 x_1 + a_2 x_2 + a_3 x_3 in this order, each product fused with the sum.
+    fn axpy4_fused(a: [f64; 4], x: [&[f64]; 4], y: &mut [f64]) {
+        let n = y.len();
+        let [x0, x1, x2, x3] = x.map(|x| &x[..n]);
+        for i in 0..n {
+            let first = a[1].mul_add(x1[i], a[0].mul_add(x0[i], y[i]));
+            y[i] = a[3].mul_add(x3[i], a[2].mul_add(x2[i], first));
+        }
+    }
+}
+
+fused! {
+    fn axpy_fused(a: f64, x: &[f64], y: &mut [f64]) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y = a.mul_add(*x, *y);
+        }
+    }
+}
+
+/// [`combine`] in the order of the columns, each product fused with the sum.
+pub fn combine_fused<'a>(a: &[f64], x: impl Fn(usize) -> &'a [f64], y: &mut [f64]) {
+    let (fours, rest) = a.as_chunks::<4>();
+    for (i, &four) in fours.iter().enumerate() {
+        axpy4_fused(four, std::array::from_fn(|p| x(4 * i + p)), y);
+    }
+    for (j, &a) in (4 * fours.len()..).zip(rest) {
+        axpy_fused(a, x(j), y);
     }
 }
 

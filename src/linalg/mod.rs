@@ -1,5 +1,5 @@
-//! What is thin over faer and nalgebra. Every routine here runs on one thread in a fixed order of operations, so that the same input
-//! gives the same bits; callers run independent pieces in parallel.
+//! What is thin over faer and nalgebra. Every routine here has a fixed order of operations, so that the same input gives the same bits, whatever the number
+//! of threads. But for [`pca`], each runs on one; callers run independent pieces in parallel.
 
 pub mod appended_qr;
 pub mod banded;

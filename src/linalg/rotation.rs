@@ -1,8 +1,8 @@
 //! Rotations of the plane and of space: polar decompositions, rotation vectors and their branches.
 //!
 //! A 3x3 matrix is its three columns: `m[j][i]` is entry (i, j), and `m[j]` the image of axis j. A rotation vector is axis times angle in
-//! radians, counter-clockwise about the axis. The functions of rotation vectors have no branches and call no library function, so that a loop over them
-//! compiles to vector instructions; they are exact to a few roundings. Entries must lie well inside the range of doubles (1e-150 to 1e150) where
+//! radians, counter-clockwise about the axis. But for [`nearest_branch`], the functions of rotation vectors have no branches and call no library function,
+//! so that a loop over them compiles to vector instructions; they are exact to a few roundings. Entries must lie well inside the range of doubles (1e-150 to 1e150) where
 //! nothing else is said; what is not finite stays so.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
@@ -85,18 +85,6 @@ pub fn plane_polar(f: [[f64; 2]; 2]) -> PlanePolar {
             0.5 * ((cos * b + sin * d) + (cos * c - sin * a)),
         ],
     }
-}
-
-/// M = R S with the rotation R nearest to M and S symmetric: S_xx, S_yy, S_zz, S_yz, S_xz, S_xy. S is positive semi-definite where det M >= 0. See
-/// [`nearest_rotation`].
-pub fn polar(m: &Matrix) -> (Matrix, [f64; 6]) {
-    let r = nearest_rotation(m);
-    let s = transposed_times(&r, m);
-    let off = |i: usize, j: usize| 0.5 * (s[i][j] + s[j][i]);
-    (
-        r,
-        [s[0][0], s[1][1], s[2][2], off(1, 2), off(0, 2), off(0, 1)],
-    )
 }
 
 /// Newton's iteration is trusted with a matrix whose determinant exceeds this when its Frobenius norm is that of a rotation.
@@ -259,7 +247,8 @@ pub fn log(r: &Matrix) -> [f64; 3] {
     [x * factor, y * factor, z * factor]
 }
 
-/// The rotation of a rotation vector, of any length.
+/// The rotation of a rotation vector. To rounding for angles of up to a million radians; beyond, rounding in the angle tells less and less, and past 1e12
+/// what comes out is no rotation.
 #[inline(always)]
 pub fn exp(v: [f64; 3]) -> Matrix {
     let angle = dot(v, v).sqrt();
@@ -502,14 +491,15 @@ mod tests {
             s[2] *= sign;
             prop_assume!(s[1] + s[2] > 1e-4);
             let scaled = m.map(|c| c.map(|x| x * 10f64.powi(scale)));
-            let (r, stretch) = polar(&scaled);
+            let r = nearest_rotation(&scaled);
             prop_assert!(is_rotation(&r));
             // The rotation's condition is that of the gap between the greatest eigenvalues of Horn's matrix.
             let tolerance = 1e-14 * (s[0] / (s[1] + s[2])).max(1.0);
             prop_assert!(gap(&r, &arrays(expected)) < tolerance, "{} {tolerance}", gap(&r, &arrays(expected)));
-            let [a, b, c, d, e, f] = stretch;
-            let product = times(&r, &[[a, f, e], [f, b, d], [e, d, c]]);
-            prop_assert!(gap(&product, &scaled) < 2e-14 * (s[0] / (s[1] + s[2])).max(1.0) * 10f64.powi(scale));
+            // What is left of the matrix is symmetric: a polar decomposition.
+            let left = transposed_times(&r, &scaled);
+            let transposed: Matrix = std::array::from_fn(|j| std::array::from_fn(|i| left[i][j]));
+            prop_assert!(gap(&transposed, &left) < 2e-14 * (s[0] / (s[1] + s[2])).max(1.0) * 10f64.powi(scale));
         }
 
         #[test]

@@ -102,7 +102,7 @@ impl Space for GradientSpace {
             positions,
         );
         self.reference.place(centres, positions);
-        Ok(())
+        check("decoded frame", positions, self.frame_len())
     }
 
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {

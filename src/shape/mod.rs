@@ -135,7 +135,7 @@ pub enum ShapeError {
 
 /// A shape space over one connectivity and reference.
 ///
-/// Positions are x0 y0 z0 x1 ... (3V numbers), vectors z have d numbers. Spaces keep their factors, so that `decode` only solves; both directions run
+/// Positions are x0 y0 z0 x1 ... (3V numbers), vectors z have d numbers. Spaces keep the factors that depend on the reference alone; both directions run
 /// on the calling thread, and frames are best taken in parallel, as [`encode_all`] does.
 pub trait Space: Send + Sync {
     /// Which space.
@@ -150,7 +150,8 @@ pub trait Space: Send + Sync {
     /// The vector of a frame, with angles in their principal branches.
     fn encode(&self, positions: &[f64], z: &mut [f64]) -> Result<(), ShapeError>;
 
-    /// The frame of a vector.
+    /// The frame of a vector. Costs sparse solves with the factors kept; of a vector of no frame (a mean of two, say), whose angles do not agree with each other,
+    /// also a factorisation in [`lric`] (3F unknowns) and [`patch`] (3 a patch), and in [`lengths`] one for each step of a descent.
     fn decode(&self, z: &[f64], positions: &mut [f64]) -> Result<(), ShapeError>;
 
     /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
@@ -160,7 +161,8 @@ pub trait Space: Send + Sync {
     fn unwrap_over_surface(&self, _z: &mut [f64]) {}
 }
 
-/// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisations that the space decodes with.
+/// Prepares a space over a connectivity and a reference frame of 3V positions. Costs the sparse factorisation of V unknowns that the space decodes with (none in
+/// [`vertex`]) and the analysis of those that vectors of no frame need.
 ///
 /// `patches` is the patch of each triangle, see [`patches::choose`]; only the space of patches looks at it, the others may be given none.
 pub fn prepare(
@@ -215,7 +217,8 @@ pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeEr
     Ok(z)
 }
 
-/// The same for examples, of which the first shows a reference pose: branches are those nearest to it.
+/// The same for examples, of which the first shows a reference pose: branches are those nearest to it, or where a space has rotations at triangles those that
+/// [`Space::unwrap_over_surface`] chooses.
 pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let mut z = encode_each(space, frames)?;
     if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {

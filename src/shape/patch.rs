@@ -214,7 +214,7 @@ impl Space for PatchSpace {
             self.poisson.solve(fill, positions);
             let placed = &z[self.pair_numbers().end..];
             self.placement.place(&self.reference, placed, positions);
-            Ok(())
+            check("decoded frame", positions, self.frame_len())
         })
     }
 

@@ -8,7 +8,7 @@ use super::placement::Placement;
 use super::poisson::Poisson;
 use super::pool::Pool;
 use super::posed::{Stretch, rest_axes};
-use super::reference::Reference;
+use super::reference::{Reference, check};
 use crate::linalg::rotation::{IDENTITY, Matrix, times};
 use crate::mesh::topology::Topology;
 
@@ -98,7 +98,7 @@ impl Surface {
             };
             self.poisson.solve(fill, positions);
             self.placement.place(reference, placed, positions);
-            Ok(())
+            check("decoded frame", positions, reference.frame_len())
         })
     }
 }

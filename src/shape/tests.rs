@@ -339,9 +339,15 @@ fn what_does_not_fit_is_refused() {
         assert!(space.encode(&frame, &mut z).is_err());
         z[2] = f64::INFINITY;
         assert!(space.decode(&z, &mut frame).is_err());
-        // Any finite vector gives a finite frame.
-        z.fill(3.7);
-        space.decode(&z, &mut frame).unwrap();
-        assert!(frame.iter().all(|x| x.is_finite()));
+        // Any finite vector gives a finite frame, or is refused where numbers go beyond all bounds.
+        for x in [3.7, -2e3, 1e17, 1e200, -1e308] {
+            z.fill(x);
+            let decoded = space.decode(&z, &mut frame);
+            assert!(decoded.is_ok() || x.abs() > 1e10, "{kind} {x}: {decoded:?}");
+            assert!(
+                decoded.is_err() || frame.iter().all(|x| x.is_finite()),
+                "{kind} {x}"
+            );
+        }
     }
 }

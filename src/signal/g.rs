@@ -7,14 +7,14 @@ use thiserror::Error;
 use super::Point;
 use super::thin_plate::{Frame, kernels};
 use crate::linalg::dense::{Cholesky, Qr, multiply};
-use crate::linalg::kernels::{axpy, combine};
-use crate::linalg::panels::Panels;
+use crate::linalg::kernels::{axpy, combine_fused};
+use crate::linalg::panels::{self, Panels};
 
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
 
-/// Points evaluated together.
-const TOGETHER: usize = 32;
+/// Points evaluated by one thread before another could begin to help, as terms of the sum.
+const ALONE: usize = 60_000;
 
 /// g(p) = g_0 + sum_j phi(||s_j - p||) g_j + G p, with phi(r) = r^2 ln r, in the units of the pose-space positions.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ impl PoseSignal {
         x.copy_from_slice(self.coefficients.col_as_slice(0));
         let mut bends = vec![0.0; l];
         kernels(p, &self.sites, &mut bends);
-        combine(&bends, |j| self.coefficients.col_as_slice(j + 1), x);
+        combine_fused(&bends, |j| self.coefficients.col_as_slice(j + 1), x);
         axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
         axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
     }
@@ -98,36 +98,45 @@ impl PoseSignal {
         let m = self.coefficients.nrows();
         let mut values = vec![0.0; m * points.len()];
         if m > 0 {
-            let panels = Panels::new(self.coefficients.get(.., 1..self.sites.len() + 1));
+            let l = self.sites.len();
+            let panels = Panels::new(self.coefficients.get(.., 1..l + 1));
+            let together = panels::TOGETHER;
+            let alone = ALONE / (together * m * (l + 1)) + 1;
             values
-                .par_chunks_mut(m * TOGETHER)
-                .zip(points.par_chunks(TOGETHER))
-                .for_each(|(x, points)| self.evaluate_together(&panels, points, x));
+                .par_chunks_mut(m * together)
+                .zip(points.par_chunks(together))
+                .with_min_len(alone)
+                .for_each_init(
+                    || vec![0.0; l * together],
+                    |bends, (x, points)| self.evaluate_together(&panels, points, bends, x),
+                );
         }
         MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
     }
 
-    /// g at a few points, m numbers each.
-    fn evaluate_together(&self, panels: &Panels, points: &[Point], values: &mut [f64]) {
+    /// g at a few points, m numbers each. `bends` has room for the kernels of all.
+    fn evaluate_together(
+        &self,
+        panels: &Panels,
+        points: &[Point],
+        bends: &mut [f64],
+        values: &mut [f64],
+    ) {
         let (l, m) = (self.sites.len(), self.coefficients.nrows());
-        let mut bends = vec![0.0; l * points.len()];
         for (i, (x, &p)) in values.chunks_exact_mut(m).zip(points).enumerate() {
             kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
             x.copy_from_slice(self.coefficients.col_as_slice(0));
         }
         let weights = |i: usize| &bends[i * l..(i + 1) * l];
-        let mut fours = values.chunks_exact_mut(4 * m);
-        for (four, x) in fours.by_ref().enumerate() {
-            let (low, high) = x.split_at_mut(2 * m);
-            let ((x0, x1), (x2, x3)) = (low.split_at_mut(m), high.split_at_mut(m));
-            panels.combine4(
-                [0, 1, 2, 3].map(|i| weights(4 * four + i)),
-                [x0, x1, x2, x3],
-            );
-        }
-        for (i, x) in fours.into_remainder().chunks_exact_mut(m).enumerate() {
-            let column = |j: usize| self.coefficients.col_as_slice(j + 1);
-            combine(weights(points.len() / 4 * 4 + i), column, x);
+        let mut each = values.chunks_exact_mut(m);
+        match points.len() == panels::TOGETHER {
+            true => {
+                let each = std::array::from_fn(|_| each.next().unwrap_or_default());
+                panels.combine(std::array::from_fn(weights), each);
+            }
+            false => each.enumerate().for_each(|(i, x)| {
+                combine_fused(weights(i), |j| self.coefficients.col_as_slice(j + 1), x);
+            }),
         }
         for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
             axpy(p[0], self.coefficients.col_as_slice(l + 1), x);

@@ -49,6 +49,12 @@ impl Equation {
                 values.len()
             )));
         }
+        if let Some(i) = (0..rows.len()).find(|&i| cols[i] > rows[i]) {
+            return Err(StageError::Failed(format!(
+                "entry {i} (0-based) is at row {}, column {}, above the diagonal; expected the lower triangle alone",
+                rows[i], cols[i]
+            )));
+        }
         let place = |(row, column): (usize, usize)| {
             let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
             [index(row), index(column)]

@@ -6,7 +6,9 @@ use nalgebra::{Matrix2, Vector3};
 
 use super::Measured;
 use super::encoding::{Mesh, Vertices, decoded_own, edges, paired_rows, placement_difference};
-use super::forms::{PairPlace, dihedral, fans, in_plane, placement_gap, turn_gap};
+use super::forms::{
+    PairPlace, dihedral, fans, in_plane, pairs_at, parts_gap, placement_gap, turn_gap,
+};
 use crate::arrays::{ArrayError, Bundle};
 
 /// Differences of so much, root mean square, are rounding and have no direction.
@@ -20,24 +22,28 @@ struct Layout {
     /// Edges with the place of their length.
     lengths: Vec<([u32; 2], usize)>,
     pairs: Vec<PairPlace>,
+    /// The component of each vertex.
+    owners: Vec<usize>,
     /// Where the six numbers of the first component are.
     components: usize,
 }
 
 impl Layout {
-    fn new(faces: &[[u32; 3]]) -> Self {
+    fn new(mesh: &Mesh) -> Self {
+        let mut owners = vec![0; mesh.reference.len()];
+        for (i, vertices) in mesh.components().iter().enumerate() {
+            vertices.iter().for_each(|&v| owners[v] = i);
+        }
         let mut layout = Self {
             lengths: Vec::new(),
             pairs: Vec::new(),
+            owners,
             components: 0,
         };
-        for (edge, fan) in fans(faces) {
+        for (edge, fan) in fans(&mesh.faces) {
             let start = layout.components;
             layout.lengths.push((edge, start));
-            let others = fan[1..].iter().zip(start + 1..);
-            layout
-                .pairs
-                .extend(others.map(|(other, place)| PairPlace::new(faces, fan[0], *other, place)));
+            layout.pairs.extend(pairs_at(mesh, &fan, start + 1));
             layout.components += fan.len().max(2);
         }
         layout
@@ -50,6 +56,12 @@ impl Layout {
             .iter()
             .map(|(ends, _)| chord(reference, *ends).norm());
         lengths.sum::<f64>() / self.lengths.len() as f64
+    }
+
+    /// Whether an edge is inside a component; others have no say in decoding.
+    fn inside(&self, ends: &[u32; 2]) -> bool {
+        let [a, b] = ends.map(|v| self.owners[v as usize]);
+        a == b
     }
 
     /// The place of the length of an edge.
@@ -72,10 +84,10 @@ fn chord(frame: Vertices, [a, b]: [u32; 2]) -> Vector3<f64> {
 
 pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh.faces);
-    let components = mesh.components();
+    let layout = Layout::new(&mesh);
+    let (components, further) = (mesh.components(), mesh.further_parts());
     let unit = layout.unit(mesh.reference);
-    let d = layout.components + 6 * components.len();
+    let d = layout.components + 6 * components.len() + 3 * further.len();
     let (mut lengths, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
     for (frame, z) in mesh.rows(inputs, outputs, d)? {
         // What no length and no angle of sound triangles takes is 0.
@@ -92,13 +104,15 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
         }
         lengths = rest.iter().fold(lengths, |most, x| most.max(x.abs()));
         let six = z[layout.components..].chunks_exact(6);
+        let form = |f: usize| {
+            let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
+            root_of(in_plane(now) * inverse(in_plane(then)))
+        };
         for (vertices, numbers) in components.iter().zip(six) {
-            let form = |f: usize| {
-                let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
-                root_of(in_plane(now) * inverse(in_plane(then)))
-            };
             placed = placed.max(placement_gap(&mesh, vertices, frame, numbers, form));
         }
+        let parts = &z[layout.components..];
+        placed = placed.max(parts_gap(&mesh, &components, &further, frame, parts, form));
     }
     Ok(vec![
         ("lengths", lengths),
@@ -129,7 +143,7 @@ pub fn against(
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh.faces);
+    let (layout, components) = (Layout::new(&mesh), mesh.components().len());
     let (mut lengths, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
     for (a, b) in paired_rows(ours, theirs)? {
         for (_, place) in &layout.lengths {
@@ -139,7 +153,7 @@ pub fn against(
             angles = angles.max(turn_gap(a[pair.place], b[pair.place]));
         }
         let [a, b] = [a, b].map(|z| &z[layout.components..]);
-        placed = placed.max(placement_difference(a, b));
+        placed = placed.max(placement_difference(a, b, components));
     }
     Ok(vec![
         ("length_difference", lengths),
@@ -152,7 +166,7 @@ pub fn against(
 pub fn descended_own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let mut found = decoded_own(inputs, outputs)?;
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh.faces);
+    let layout = Layout::new(&mesh);
     let (shape, z) = inputs.f64("z", 2)?;
     let frames = outputs.f64("frames", 3)?.1;
     let rows = z.chunks_exact(shape[1].max(1));
@@ -183,7 +197,11 @@ fn stationarity(mesh: &Mesh, layout: &Layout, frame: Vertices, z: &[f64]) -> [f6
             *square += by.component_mul(&by);
         }
     };
-    for &(ends, place) in &layout.lengths {
+    for &(ends, place) in layout
+        .lengths
+        .iter()
+        .filter(|(ends, _)| layout.inside(ends))
+    {
         let along = chord(frame, ends);
         let direction = along.normalize();
         add(

@@ -1,13 +1,15 @@
 //! Shape spaces: encodings put back together by their formulas, compared up to the branches of their angles; frames decoded beside where they
 //! came from.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::{Measured, diagonal, greatest, shaped, share};
 use crate::arrays::{ArrayError, Bundle};
 
-/// Reference triangles no higher than this over their longest edge, squared, have no gradient (PROTOCOL.md).
-const DEGENERATE: f64 = 1e-10;
+/// Reference triangles no higher than this over their longest edge, squared, are degenerate (PROTOCOL.md).
+const DEGENERATE: f64 = 1e-5;
 
 /// A frame's vertices.
 pub(super) type Vertices<'a> = &'a [[f64; 3]];
@@ -59,22 +61,56 @@ impl<'a> Mesh<'a> {
         (centre - Vector3::from_column_slice(found)).amax()
     }
 
-    /// The vertices of each component, by lowest vertex: components are joined by sound triangles.
-    pub fn components(&self) -> Vec<Vec<usize>> {
-        let mut label: Vec<usize> = (0..self.reference.len()).collect();
-        let sound: Vec<&[u32; 3]> = self.faces.iter().filter(|f| self.is_sound(f)).collect();
-        // Labels sink along triangles until none changes.
+    /// The lowest member that each is joined to by these groups: labels sink along groups until none changes.
+    pub fn lowest_joined(count: usize, groups: &[Vec<usize>]) -> Vec<usize> {
+        let mut label: Vec<usize> = (0..count).collect();
         let mut changed = true;
         while changed {
             changed = false;
-            for face in sound.iter().chain(sound.iter().rev()) {
-                let least = face.iter().map(|&v| label[v as usize]).min().unwrap_or(0);
-                for &v in *face {
-                    changed |= label[v as usize] != least;
-                    label[v as usize] = least;
+            for group in groups.iter().chain(groups.iter().rev()) {
+                let least = group.iter().map(|&v| label[v]).min().unwrap_or(0);
+                for &v in group {
+                    changed |= label[v] != least;
+                    label[v] = least;
                 }
             }
         }
+        label
+    }
+
+    /// The further parts, each as its lowest triangle and that of its component: parts are sound triangles that edges join.
+    pub fn further_parts(&self) -> Vec<(usize, usize)> {
+        let sound = |f: &usize| self.is_sound(&self.faces[*f]);
+        let mut at: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+        for f in (0..self.faces.len()).filter(sound) {
+            let [a, b, c] = self.faces[f];
+            for [a, b] in [[a, b], [b, c], [c, a]] {
+                at.entry([a.min(b), a.max(b)]).or_default().push(f);
+            }
+        }
+        let edges: Vec<Vec<usize>> = at.into_values().collect();
+        let parts = Self::lowest_joined(self.faces.len(), &edges);
+        let components = self.components();
+        let lowest = |f: usize| {
+            let own = self.faces[f][0] as usize;
+            let vertices = components.iter().find(|vertices| vertices.contains(&own));
+            let inside =
+                |g: &usize| vertices.is_some_and(|v| v.contains(&(self.faces[*g][0] as usize)));
+            (0..self.faces.len()).filter(sound).find(inside)
+        };
+        (0..self.faces.len())
+            .filter(sound)
+            .filter(|&f| parts[f] == f)
+            .filter_map(|f| Some((f, lowest(f)?)))
+            .filter(|(f, lowest)| f != lowest)
+            .collect()
+    }
+
+    /// The vertices of each component, by lowest vertex: components are joined by sound triangles.
+    pub fn components(&self) -> Vec<Vec<usize>> {
+        let sound = self.faces.iter().filter(|f| self.is_sound(f));
+        let groups: Vec<Vec<usize>> = sound.map(|f| f.map(|v| v as usize).to_vec()).collect();
+        let label = Self::lowest_joined(self.reference.len(), &groups);
         let mut components: Vec<Vec<usize>> = vec![Vec::new(); label.len()];
         for (v, &lowest) in label.iter().enumerate() {
             components[lowest].push(v);
@@ -155,14 +191,16 @@ pub(super) fn paired_rows<'a>(
     Ok(a.chunks_exact(d).zip(b.chunks_exact(d)))
 }
 
-/// How far apart the rotations and centres of components are, six numbers each.
-pub(super) fn placement_difference(a: &[f64], b: &[f64]) -> f64 {
-    let gap = |a: &[f64], b: &[f64]| {
-        let turned = (rotation(&a[..3]) - rotation(&b[..3])).amax();
-        turned.max(greatest(&a[3..], &b[3..]))
-    };
-    let both = a.chunks_exact(6).zip(b.chunks_exact(6));
-    both.map(|(a, b)| gap(a, b)).fold(0.0, f64::max)
+/// How far apart the rotations and centres of components are, six numbers each, and then the rotations of further parts, three each.
+pub(super) fn placement_difference(a: &[f64], b: &[f64], components: usize) -> f64 {
+    let turned = |a: &[f64], b: &[f64]| (rotation(&a[..3]) - rotation(&b[..3])).amax();
+    let gap = |(a, b): (&[f64], &[f64])| turned(a, b).max(greatest(&a[3..], &b[3..]));
+    let ((a, a_parts), (b, b_parts)) = (a.split_at(6 * components), b.split_at(6 * components));
+    let placed = a.chunks_exact(6).zip(b.chunks_exact(6)).map(gap);
+    let parts = a_parts.chunks_exact(3).zip(b_parts.chunks_exact(3));
+    placed
+        .chain(parts.map(|(a, b)| turned(a, b)))
+        .fold(0.0, f64::max)
 }
 
 pub fn gradient_against(

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{SQRT_2, TAU};
 
-use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use super::Measured;
 use super::encoding::{Mesh, Vertices, edges, paired_rows, placement_difference, rotation};
@@ -58,8 +58,19 @@ pub(super) fn fans(faces: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<Half>> {
     fans
 }
 
+/// The pairs of an edge: its lowest sound triangle (the lowest where none is) with each of the others; their angles are from `place` on.
+pub(super) fn pairs_at(mesh: &Mesh, fan: &[Half], place: usize) -> Vec<PairPlace> {
+    let hub = fan.iter().position(|&(f, _)| mesh.is_sound(&mesh.faces[f]));
+    let hub = fan[hub.unwrap_or(0)];
+    let others = fan.iter().filter(|half| **half != hub).zip(place..);
+    others
+        .map(|(other, place)| PairPlace::new(&mesh.faces, hub, *other, place))
+        .collect()
+}
+
 impl Layout {
-    fn new(faces: &[[u32; 3]]) -> Self {
+    fn new(mesh: &Mesh) -> Self {
+        let faces = &mesh.faces;
         let mut layout = Self {
             halves: vec![[usize::MAX; 3]; faces.len()],
             pairs: Vec::new(),
@@ -70,10 +81,8 @@ impl Layout {
             for (i, &(f, corner)) in fan.iter().enumerate() {
                 layout.halves[f][corner] = start + i;
             }
-            let others = fan[1..].iter().zip(start + fan.len()..);
-            layout
-                .pairs
-                .extend(others.map(|(other, place)| PairPlace::new(faces, fan[0], *other, place)));
+            let pairs = pairs_at(mesh, fan, start + fan.len());
+            layout.pairs.extend(pairs);
             layout.components += (2 * fan.len() - 1).max(3);
         }
         layout
@@ -140,21 +149,50 @@ pub(super) fn placement_gap(
 ) -> f64 {
     let inside = |f: &[u32; 3]| mesh.is_sound(f) && vertices.contains(&(f[0] as usize));
     let turned = match mesh.faces.iter().position(inside) {
-        Some(f) => {
-            let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
-            let mapped = rotation(&numbers[..3]) * axes(then) * form(f) * in_plane(then);
-            (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
-        }
+        Some(f) => turn_gap_of(mesh, f, frame, rotation(numbers), form(f)),
         None => numbers[..3].iter().map(|x| x.abs()).fold(0.0, f64::max),
     };
     turned.max(mesh.centre_gap(frame, vertices, &numbers[3..]))
 }
 
+/// How far a triangle that is stretched by its form and then turned is from where it is in the frame.
+fn turn_gap_of(
+    mesh: &Mesh,
+    f: usize,
+    frame: Vertices,
+    turn: Matrix3<f64>,
+    form: Matrix2<f64>,
+) -> f64 {
+    let [then, now] = [mesh.reference, frame].map(|at| edges(at, &mesh.faces[f]));
+    let mapped = turn * axes(then) * form * in_plane(then);
+    (mapped - Matrix3x2::from_columns(&now)).amax() / mesh.diagonal
+}
+
+/// The same of the further parts, whose rotations come after the six numbers of all components, against those of their components' lowest triangles.
+pub(super) fn parts_gap(
+    mesh: &Mesh,
+    components: &[Vec<usize>],
+    further: &[(usize, usize)],
+    frame: Vertices,
+    placed: &[f64],
+    form: impl Fn(usize) -> Matrix2<f64>,
+) -> f64 {
+    let (six, parts) = placed.split_at(6 * components.len());
+    let gap = |(&(f, lowest), vector): (&(usize, usize), &[f64])| {
+        let own = mesh.faces[lowest][0] as usize;
+        let component = components.iter().position(|c| c.contains(&own));
+        let turn = rotation(&six[6 * component.unwrap_or(0)..]) * rotation(vector);
+        turn_gap_of(mesh, f, frame, turn, form(f))
+    };
+    let parts = further.iter().zip(parts.chunks_exact(3)).map(gap);
+    parts.fold(0.0, f64::max)
+}
+
 pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh.faces);
-    let components = mesh.components();
-    let d = layout.components + 6 * components.len();
+    let layout = Layout::new(&mesh);
+    let (components, further) = (mesh.components(), mesh.further_parts());
+    let d = layout.components + 6 * components.len() + 3 * further.len();
     let (mut lengths, mut angles, mut placed) = (0.0f64, 0.0f64, 0.0f64);
     for (frame, z) in mesh.rows(inputs, outputs, d)? {
         for (face, halves) in mesh.faces.iter().zip(&layout.halves) {
@@ -187,6 +225,9 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
             let form = |f: usize| form(z, &layout.halves[f]);
             placed = placed.max(placement_gap(&mesh, vertices, frame, numbers, form));
         }
+        let form = |f: usize| form(z, &layout.halves[f]);
+        let parts = &z[layout.components..];
+        placed = placed.max(parts_gap(&mesh, &components, &further, frame, parts, form));
     }
     Ok(vec![
         ("first_form", lengths),
@@ -201,7 +242,7 @@ pub fn against(
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh.faces);
+    let (layout, components) = (Layout::new(&mesh), mesh.components().len());
     let mut is_angle = vec![false; layout.components];
     layout
         .pairs
@@ -216,7 +257,7 @@ pub fn against(
             }
         }
         let [a, b] = [a, b].map(|z| &z[layout.components..]);
-        placed = placed.max(placement_difference(a, b));
+        placed = placed.max(placement_difference(a, b, components));
     }
     Ok(vec![
         ("form_difference", forms),

@@ -17,6 +17,8 @@ struct Layout {
     pairs: Vec<[usize; 2]>,
     /// The component of every patch.
     components: Vec<usize>,
+    /// The lowest patch of each set that pairs join, but that of its component's lowest patch.
+    further: Vec<usize>,
 }
 
 impl Layout {
@@ -41,23 +43,36 @@ impl Layout {
             );
         }
         let component = |v: &u32| parts.iter().position(|part| part.contains(&(*v as usize)));
-        Ok(Self {
+        let pairs: Vec<[usize; 2]> = pairs.into_iter().collect();
+        let groups: Vec<Vec<usize>> = pairs.iter().map(|pair| pair.to_vec()).collect();
+        let sets = Mesh::lowest_joined(owners.len(), &groups);
+        let mut layout = Self {
             labels,
-            pairs: pairs.into_iter().collect(),
+            pairs,
             components: owners.values().filter_map(component).collect(),
-        })
+            further: Vec::new(),
+        };
+        let leads =
+            |&p: &usize| sets[p] == p && layout.lowest_patch(layout.components[p]) != Some(p);
+        layout.further = (0..layout.components.len()).filter(leads).collect();
+        Ok(layout)
     }
 
     fn lowest_patch(&self, component: usize) -> Option<usize> {
         self.components.iter().position(|&c| c == component)
     }
 
-    /// Rotations of the patches along chains of pairs, from the lowest of each component.
+    /// Rotations of the patches along chains of pairs, from the lowest of each component and of each further set.
     fn rotations(&self, relative: &[f64], placed: &[f64]) -> Vec<Matrix3<f64>> {
         let mut found: Vec<Option<Matrix3<f64>>> = vec![None; self.components.len()];
         let mut start = Some(0).filter(|_| !found.is_empty());
+        let parts = placed.len() - 3 * self.further.len();
         while let Some(patch) = start {
-            found[patch] = Some(rotation(&placed[6 * self.components[patch]..]));
+            let component = rotation(&placed[6 * self.components[patch]..]);
+            found[patch] = Some(match self.further.iter().position(|&p| p == patch) {
+                Some(i) => component * rotation(&placed[parts + 3 * i..]),
+                None => component,
+            });
             let mut changed = true;
             while changed {
                 changed = false;
@@ -84,7 +99,8 @@ pub fn own(inputs: &Bundle, outputs: &Bundle) -> Result<Vec<Measured>, ArrayErro
     let areas: Vec<f64> = mesh.faces.iter().map(|f| area(&mesh, f)).collect();
     let (mut formula, mut negative, mut mean, mut joints, mut placed) =
         (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
-    for (frame, z) in mesh.rows(inputs, outputs, triangles + pairs + 6 * parts.len())? {
+    let d = triangles + pairs + 6 * parts.len() + 3 * layout.further.len();
+    for (frame, z) in mesh.rows(inputs, outputs, d)? {
         let (relative, six) = z[triangles..].split_at(pairs);
         let patches = layout.rotations(relative, six);
         let mut sums = vec![(Matrix3::zeros(), 0.0); patches.len()];
@@ -145,7 +161,8 @@ pub fn against(
     theirs: &Bundle,
 ) -> Result<Vec<Measured>, ArrayError> {
     let mesh = Mesh::new(inputs)?;
-    let layout = Layout::new(&mesh, inputs, &mesh.components())?;
+    let components = mesh.components();
+    let layout = Layout::new(&mesh, inputs, &components)?;
     let triangles = 9 * mesh.faces.len();
     let end = triangles + 3 * layout.pairs.len();
     let turn_gap = |a: &[f64], b: &[f64]| (rotation(a) - rotation(b)).amax();
@@ -161,9 +178,13 @@ pub fn against(
         {
             patches = patches.max(turn_gap(a, b));
         }
-        for (a, b) in a[end..].chunks_exact(6).zip(b[end..].chunks_exact(6)) {
+        let parts = end + 6 * components.len();
+        for (a, b) in a[end..parts].chunks_exact(6).zip(b[end..].chunks_exact(6)) {
             patches = patches.max(turn_gap(a, b));
             numbers = numbers.max(greatest(&a[3..], &b[3..]));
+        }
+        for (a, b) in a[parts..].chunks_exact(3).zip(b[parts..].chunks_exact(3)) {
+            patches = patches.max(turn_gap(a, b));
         }
     }
     Ok(vec![

@@ -4,7 +4,7 @@ use super::animals::Animal;
 use super::motion::Motion;
 use super::{
     SyntheticError, animals, bar, book, character, face, flag, gallop, jelly, klein, ring, roam,
-    roll, trot,
+    roll, scraps, trot,
 };
 use crate::sequence::Sequence;
 
@@ -161,6 +161,24 @@ pub(super) const CATALOGUE: &[Entry] = &[
         faces: 784,
         good_for: "tests on a surface that cannot be oriented",
         make: Make::Whole(|| klein::build(&klein::SMALL)),
+    },
+    Entry {
+        name: "@scraps",
+        summary: "pages at one spine with a fan that hangs on a vertex, a flap on a thin triangle, a loose scrap and a vertex",
+        frames: 30,
+        vertices: 830,
+        faces: 1523,
+        good_for: "every rule for odd meshes: non-manifold edges, several components, parts, triangles of no area",
+        make: Make::Whole(|| scraps::build(&scraps::FULL)),
+    },
+    Entry {
+        name: "@scraps-small",
+        summary: "@scraps with fewer vertices",
+        frames: 30,
+        vertices: 91,
+        faces: 131,
+        good_for: "tests of the rules for odd meshes",
+        make: Make::Whole(|| scraps::build(&scraps::SMALL)),
     },
     Entry {
         name: "@character",

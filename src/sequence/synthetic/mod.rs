@@ -18,6 +18,7 @@ pub mod klein;
 pub mod ring;
 pub mod roam;
 pub mod roll;
+pub mod scraps;
 pub mod trot;
 
 mod biped;
