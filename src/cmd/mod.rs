@@ -7,6 +7,7 @@ mod doctor;
 mod info;
 mod list;
 mod output;
+mod places;
 mod report;
 mod run;
 mod signal;

@@ -17,7 +17,8 @@ use faer::MatRef;
 use serde_json::json;
 
 use self::tables::placed_frames;
-use super::output::{check_not_input, check_place, draft_json, say};
+use super::output::{draft_json, say};
+use super::places::Places;
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
@@ -194,7 +195,6 @@ struct Fitted {
     patches: Vec<i64>,
 }
 
-impl Fitted {
 /// What refinement did.
 struct Refined {
     told: Refinement,
@@ -202,6 +202,7 @@ struct Refined {
     rms_before: Option<f64>,
 }
 
+impl Fitted {
     fn stored(self, sequence: &Sequence, space: SpaceKind, reference: Vec<f64>) -> Stored {
         Stored {
             representation: self.found.fit.representation,
@@ -218,11 +219,7 @@ impl FitVerb {
     pub fn run(self) -> Outcome {
         let how = self.how()?;
         self.check_constants()?;
-        if let Some(out) = &self.out {
-            check_representation_place(out)?;
-            check_not_input(out, &[Path::new(&self.sequence)])?;
-        }
-        self.json.as_deref().map_or(Ok(()), check_place)?;
+        self.check_places()?;
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
@@ -253,6 +250,19 @@ impl FitVerb {
             say(&note);
         }
         Ok(true)
+    }
+
+    fn check_places(&self) -> Result<(), Failure> {
+        let out = self.out.as_deref();
+        out.map_or(Ok(()), check_representation_name)?;
+        Places::default()
+            .reads_sequence("<SEQUENCE>", &self.sequence)
+            .reads("--reference", self.reference.as_ref())
+            .reads("--pins", self.pins.as_ref())
+            .writes("-o", out)
+            .writes("--json", self.json.as_ref())
+            .check()?;
+        Ok(())
     }
 
     /// An error unless something says how close the fit is to be, and nothing contradicts it.
@@ -366,6 +376,7 @@ impl FitVerb {
         let Some(space) = space else {
             let frames = MatRef::from_column_major_slice(frames, d, n);
             let most = allowed.error(tolerance, d / 3);
+            let rms_of = |fit: &Fit| (fit.errors.psi / (n * d / 3) as f64).sqrt();
             let (fit, told) = match (&constants, &refine) {
                 (Some(options), None) => (fit(frames, options)?, None),
                 (Some(options), Some(how)) => {
@@ -379,7 +390,6 @@ impl FitVerb {
                     refined(found, None)
                 }
             };
-            let rms_of = |fit: &Fit| (fit.errors.psi / (n * d / 3) as f64).sqrt();
             let rms = rms_of(&fit);
             return Ok((SpaceFit { fit, rms }, told));
         };
@@ -433,6 +443,7 @@ fn refine_numbers(refined: &Refined, size: f64) -> serde_json::Value {
 fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value {
     let found = &fitted.found;
     let fit = &found.fit;
+    let size = bounds(sequence.frame(0)).diagonal();
     let (k, l, m) = fit.klm();
     let (n, vertices) = (
         sequence.frame_count(),
@@ -441,7 +452,6 @@ fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value 
     let distance = found.rms * ((n * vertices) as f64).sqrt();
     let mut numbers = json!({
         "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
-    let size = bounds(sequence.frame(0)).diagonal();
         "V": vertices, "F": sequence.connectivity().faces().len(),
         "space": how.space.name(), "knots": how.knots.to_string(),
         "layout": how.layout.to_string(), "layout_weight": fit.layout_weight,
@@ -481,6 +491,7 @@ fn astray(fit: &Fit, before: usize) -> Vec<serde_json::Value> {
         .collect()
 }
 
+/// Nothing is nothing of anything, also of nothing.
 fn ratio(value: f64, scale: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / scale }
 }
@@ -491,15 +502,17 @@ fn spread(sequence: &Sequence) -> f64 {
     frames.map(frame_spread).sum::<f64>().sqrt()
 }
 
-/// Nothing is nothing of anything, also of nothing.
 fn describe(name: &str, v: &serde_json::Value) -> String {
     let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
     let refined = v.get("refine").map_or(String::new(), |r| {
         let number = |key: &str| r[key].as_f64().unwrap_or(f64::NAN);
+        let rms = r["rms_relative_before"].as_f64();
+        let rms = rms.map(|rms| format!(", relative RMS from {:.4}%", 100.0 * rms));
         format!(
             "\nrefined: (2) from {:.5}{} in {} steps and {:.0} ms",
             number("error_psi_before"),
+            rms.unwrap_or_default(),
             r["iterations"],
             number("time_ms")
         )
@@ -507,12 +520,9 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
     format!(
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
-        let rms = r["rms_relative_before"].as_f64();
-        let rms = rms.map(|rms| format!(", relative RMS from {:.4}%", 100.0 * rms));
          {}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers in h, g and f for {} given\n\
          ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
-            rms.unwrap_or_default(),
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],
@@ -566,11 +576,13 @@ fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
     Ok(pins)
 }
 
-/// An error where a representation could not be written: it is one .npz file.
-fn check_representation_place(path: &Path) -> Result<(), Failure> {
-    if path.extension().is_none_or(|e| e != "npz") {
-        let place = path.display();
-        return Err(format!("{place}: a representation is one .npz file; name it so").into());
+/// An error where a representation is not called what it is: one .npz file.
+fn check_representation_name(path: &Path) -> Result<(), Failure> {
+    match path.extension().is_some_and(|e| e == "npz") {
+        true => Ok(()),
+        false => {
+            let place = path.display();
+            Err(format!("{place}: a representation is one .npz file; name it so").into())
+        }
     }
-    Ok(check_place(path)?)
 }
