@@ -175,7 +175,7 @@ impl Run {
         super::output::write_whole(&page, &super::report::page(&record)?)?;
         say(&summary(&record));
         if failed > 0 {
-            say(&format!("{failed} exhibits failed"));
+            say(&format!("exhibits failed: {failed}"));
         }
         say(&format!(
             "report: {}",
