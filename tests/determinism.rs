@@ -72,6 +72,97 @@ fn fits_do_not_depend_on_threads() {
     }
 }
 
+#[test]
+fn refined_fits_do_not_depend_on_threads() {
+    for choice in [
+        "@gallop-small --k 16 --l 12 --m 7 --refine",
+        "@jelly-small --tolerance 0.02 --refine",
+        "@gallop-small --k 14 --l 10 --m 6 --space gradient --refine --between 0",
+        "@roam-small --k 14 --l 10 --m 6 --window 25 --refine",
+    ] {
+        same_bytes("rep.npz", |out| {
+            words(&format!("signal fit {choice} -o {out}"))
+        });
+    }
+}
+
+/// Encoding and decoding, with factors and sums of their own, in every space.
+#[test]
+fn fits_and_samples_in_every_space_do_not_depend_on_threads() {
+    for space in ["gradient", "lric", "lengths"] {
+        let fit = format!("signal fit @gallop-small --k 14 --l 10 --m 6 --space {space}");
+        same_bytes("rep.npz", |out| words(&format!("{fit} -o {out}")));
+        let scratch = Scratch::new();
+        let rep = scratch.arg("rep.npz");
+        must(&words(&format!("{fit} -o {rep}")));
+        same_bytes("frames.npz", |out| {
+            words(&format!("signal sample {rep} --frames 31 -o {out}"))
+        });
+    }
+}
+
+#[test]
+fn transfers_do_not_depend_on_threads() {
+    let scratch = Scratch::new();
+    let rep = scratch.arg("rep.npz");
+    must(&words(&format!(
+        "signal fit @gallop-small --k 16 --l 12 --m 7 --space gradient -o {rep}"
+    )));
+    let examples = "--examples @gallop-small @gallop-small --example-frames 1..8";
+    for choice in [
+        format!("@gallop-small {examples}"),
+        format!("@gallop-small {examples} --k 16 --l 12 --space gradient"),
+        format!("{rep} {examples}"),
+    ] {
+        same_bytes("moved.npz", |out| {
+            let told = out.replace("moved.npz", "told");
+            words(&format!(
+                "signal transfer {choice} -o {out} --rep {told}.npz --json {told}.json"
+            ))
+        });
+    }
+}
+
+#[test]
+fn edits_and_designs_do_not_depend_on_threads() {
+    let scratch = Scratch::new();
+    let [rep, edits, poses, curve] =
+        ["rep.npz", "edits.toml", "poses.csv", "curve.csv"].map(|name| scratch.arg(name));
+    must(&words(&format!(
+        "signal fit @gallop-small --k 16 --l 12 --m 7 -o {rep}"
+    )));
+    let all = "[[edit]]\ndo = \"repeat\"\nframes = \"1..12\"\njoin = 3\n\
+               [[edit]]\ndo = \"delete\"\nframes = \"3..5\"\njoin = 2\n\
+               [[edit]]\ndo = \"reverse\"\nframes = \"6..9\"\njoin = 1\n\
+               [[edit]]\ndo = \"move\"\ncontrol = 5\nby = [0.2, -0.1]\n";
+    fs::write(&edits, all).unwrap();
+    same_bytes("edited.npz", |out| {
+        words(&format!(
+            "signal edit {rep} {edits} -o {out} --json {out}.json"
+        ))
+    });
+    fs::write(&poses, "frame,x,y\n1,0,0\n4,2,0\n7,2,2\n10,0,2\n").unwrap();
+    fs::write(&curve, "x,y\n0,0\n1,-0.3\n2,0\n2.2,1\n2,2\n0,2\n").unwrap();
+    for space in ["vertex", "gradient"] {
+        same_bytes("designed.npz", |out| {
+            words(&format!(
+                "signal design {poses} {curve} @gallop-small --closed --space {space} -o {out} --rep {out}.rep.npz --json {out}.json"
+            ))
+        });
+    }
+}
+
+#[test]
+fn predictions_do_not_depend_on_threads() {
+    for choice in ["", "--refine", "--space gradient --layout ordered"] {
+        same_bytes("told.json", |out| {
+            words(&format!(
+                "signal leave-out @gallop-small {choice} --json {out}"
+            ))
+        });
+    }
+}
+
 /// Long enough for the parallel ways of every stage.
 #[test]
 fn long_fits_do_not_depend_on_threads() {

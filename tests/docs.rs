@@ -42,10 +42,12 @@ fn examples(verb: &[&str]) -> String {
     block.fold(inline.to_owned(), |all, line| format!("{all} {line}"))
 }
 
-/// The verbs below `signal`.
-fn signal_verbs() -> Vec<String> {
-    let help = meshseq(&["signal", "--help"]);
-    let (_, commands) = help.split_once("Commands:\n").unwrap();
+/// The verbs below a verb, or below none of them.
+fn below(verb: &[&str]) -> Vec<String> {
+    let help = meshseq(&[verb, &["--help"]].concat());
+    let Some((_, commands)) = help.split_once("Commands:\n") else {
+        return Vec::new();
+    };
     let lines = commands.lines().take_while(|line| !line.is_empty());
     // Further lines of a long description are indented deeper.
     let named = lines.filter_map(|line| line.strip_prefix("  "));
@@ -55,6 +57,35 @@ fn signal_verbs() -> Vec<String> {
     verbs.map(str::to_owned).collect()
 }
 
+/// Also those that take too long to be run here.
+#[test]
+fn every_verb_has_an_example() {
+    let mut leaves = 0;
+    let mut verbs: Vec<Vec<String>> = below(&[]).into_iter().map(|verb| vec![verb]).collect();
+    while let Some(verb) = verbs.pop() {
+        let words: Vec<&str> = verb.iter().map(String::as_str).collect();
+        let subverbs = below(&words);
+        if subverbs.is_empty() {
+            leaves += 1;
+            let call = format!("meshseq {}", words.join(" "));
+            let script = examples(&words);
+            let calls = |line: &str| line == call || line.starts_with(&format!("{call} "));
+            // Some say where before they say what.
+            let said = script.lines().any(|line| {
+                let from = line.find("meshseq ").unwrap_or(0);
+                calls(line[from..].trim_end())
+            });
+            assert!(said, "no example of `{call}` in {script}");
+        }
+        verbs.extend(
+            subverbs
+                .into_iter()
+                .map(|name| [verb.clone(), vec![name]].concat()),
+        );
+    }
+    assert!(leaves >= 16, "{leaves}");
+}
+
 #[test]
 fn examples_on_embedded_sequences_run_as_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -62,7 +93,7 @@ fn examples_on_embedded_sequences_run_as_written() {
     let mut path = std::ffi::OsString::from(program.parent().unwrap());
     path.push(":");
     path.push(std::env::var_os("PATH").unwrap_or_default());
-    let signal = signal_verbs();
+    let signal = below(&["signal"]);
     assert!(signal.len() >= 5, "{signal:?}");
     let plain = ["info", "convert", "list"].map(|verb| vec![verb]);
     let signal = signal.iter().map(|verb| vec!["signal", verb.as_str()]);

@@ -49,6 +49,31 @@ fn the_tolerance_holds_over_the_whole_sequence() {
     }
 }
 
+#[test]
+fn times_and_dimensions_are_told_of_the_whole_and_of_each_window() {
+    let scratch = Scratch::new();
+    let json = scratch.arg("told.json");
+    let fit = "signal fit @roam-small:30 --k 10 --l 8 --m 5 --window 18 --json";
+    for space in ["vertex", "gradient"] {
+        let told = numbers(&scratch, &format!("{fit} {json} --space {space}"));
+        assert!(number(&told, "elapsed_ms") > 0.0 && told.get("time_ms").is_none());
+        let windows = told["windows"].as_array().unwrap();
+        for window in windows {
+            assert_eq!(window["d"], told["d"]);
+            for stage in ["h", "mds", "rbf", "g", "f"] {
+                assert!(number(&window["time_ms"], stage) >= 0.0);
+            }
+        }
+        let d = number(&told, "d");
+        let of_frames = 3.0 * number(&told, "V");
+        assert!(if space == "vertex" {
+            d == of_frames
+        } else {
+            d > of_frames
+        });
+    }
+}
+
 /// Windows see all the frames, in every format, and a choice of them; nothing else changes what they are.
 #[test]
 fn the_frames_matter_and_not_where_they_are_read_from() {

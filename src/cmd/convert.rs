@@ -1,10 +1,11 @@
 //! `convert SEQ OUT`: another format.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::{check_not_input, say};
+use super::output::say;
+use super::places::Places;
 use super::{FrameChoice, Outcome};
 use crate::sequence::format::write;
 
@@ -20,7 +21,8 @@ pub struct Convert {
 
 impl Convert {
     pub fn run(self) -> Outcome {
-        check_not_input(&self.out, &[Path::new(&self.sequence)])?;
+        let places = Places::default().reads_sequence("<SEQUENCE>", &self.sequence);
+        places.writes_sequence("<OUT>", &self.out).check()?;
         let sequence = self.frames.open(&self.sequence)?;
         write(&sequence, &self.out)?;
         say(&format!(

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::output::{Draft, check_place, draft_json, say};
+use super::output::{Draft, draft_json, say};
+use super::places::Places;
 use super::{FrameChoice, Outcome};
 use crate::mesh::measure::{Measures, bounds, counts, measure_frames};
 use crate::mesh::self_intersections::{SelfIntersections, self_intersections_of_frames};
@@ -26,8 +27,11 @@ pub struct Info {
 
 impl Info {
     pub fn run(self) -> Outcome {
-        self.json.as_deref().map_or(Ok(()), check_place)?;
-        self.quality.as_deref().map_or(Ok(()), check_place)?;
+        Places::default()
+            .reads_sequence("<SEQUENCE>", &self.sequence)
+            .writes("--json", self.json.as_ref())
+            .writes("--quality", self.quality.as_ref())
+            .check()?;
         let sequence = self.frames.open(&self.sequence)?;
         let mesh = sequence.connectivity();
         let c = counts(mesh.vertex_count(), mesh.faces());

@@ -7,6 +7,7 @@ mod doctor;
 mod info;
 mod list;
 mod output;
+mod places;
 mod report;
 mod run;
 mod signal;
@@ -58,6 +59,7 @@ enum Verb {
     #[command(after_help = "Example: meshseq list signal")]
     List(list::List),
     /// What is installed, and how to get what is missing
+    #[command(after_help = "Example: meshseq doctor")]
     Doctor,
     /// Embedded sequences, and real data where it lies
     #[command(after_help = "Example: meshseq data --data ~/meshes")]

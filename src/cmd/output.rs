@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
@@ -19,9 +19,6 @@ pub enum OutputError {
     /// The name of a folder where that of a file is needed.
     #[error("{}: cannot write, because it is a folder; name a file", .path.display())]
     IsFolder { path: PathBuf },
-    /// What is read would be lost.
-    #[error("{}: cannot write, because it is what is read; name another place", .path.display())]
-    IsInput { path: PathBuf },
     /// The operating system refused: no room, no permission.
     #[error("{}: cannot write: {source}; nothing was written, make room or choose another place and repeat", .path.display())]
     Refused { path: PathBuf, source: io::Error },
@@ -47,17 +44,6 @@ pub fn check_parent(path: &Path) -> Result<(), OutputError> {
         return Err(OutputError::NoFolder { path, folder });
     }
     Ok(())
-}
-
-/// An error where a result would take the place of what it is made of.
-pub fn check_not_input(path: &Path, inputs: &[&Path]) -> Result<(), OutputError> {
-    let there = |path: &Path| fs::canonicalize(path).ok();
-    match there(path)
-        .is_some_and(|out| inputs.iter().any(|input| there(input) == Some(out.clone())))
-    {
-        true => Err(OutputError::IsInput { path: path.into() }),
-        false => Ok(()),
-    }
 }
 
 /// A text on disk that has not got its name yet; dropping it removes it.
@@ -122,12 +108,12 @@ pub fn draft_json(path: &Path, value: &serde_json::Value) -> Result<Draft, Failu
     Ok(Draft::new(path, &text)?)
 }
 
-/// A bar on standard error while standard output is a terminal; nothing otherwise.
+/// A bar on standard error while standard output is a terminal; nothing otherwise. It goes away where it ends, also by an error.
 pub fn progress(steps: usize) -> ProgressBar {
     if !std::io::stdout().is_terminal() {
         return ProgressBar::hidden();
     }
-    let bar = ProgressBar::new(steps as u64);
+    let bar = ProgressBar::new(steps as u64).with_finish(ProgressFinish::AndClear);
     if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}") {
         bar.set_style(style);
     }

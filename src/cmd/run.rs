@@ -77,7 +77,7 @@ impl Verify {
         } else {
             Timing::None
         };
-        let record = self.run.execute(&cases, fault, timing, self.exhibits)?;
+        let Done { record, failed } = self.run.execute(&cases, fault, timing, self.exhibits)?;
         let wrong = record.agreement.iter().filter(|row| {
             !matches!(
                 row.verdict,
@@ -88,7 +88,7 @@ impl Verify {
             .agreement
             .iter()
             .any(|row| row.verdict == Verdict::Missing);
-        Ok(wrong.count() == 0 && !(self.require_oracles && missing))
+        Ok(wrong.count() == 0 && failed == 0 && !(self.require_oracles && missing))
     }
 }
 
@@ -98,12 +98,20 @@ impl Measure {
         if self.run.cases.is_empty() {
             cases.retain(|case| case.measure);
         }
-        let record = self.run.execute(&cases, None, Timing::All, false)?;
-        Ok(record
+        let done = self.run.execute(&cases, None, Timing::All, false)?;
+        Ok(done
+            .record
             .agreement
             .iter()
             .all(|row| row.verdict != Verdict::Differ))
     }
+}
+
+/// A run that came to its end.
+struct Done {
+    record: Record,
+    /// Exhibits that could not be made though their data are there.
+    failed: usize,
 }
 
 impl Run {
@@ -113,7 +121,7 @@ impl Run {
         fault: Option<&'static inject::Fault>,
         timing: Timing,
         with_exhibits: bool,
-    ) -> Result<Record, Failure> {
+    ) -> Result<Done, Failure> {
         let options = Options {
             home: home(),
             data: DataFolders::new(self.data.as_deref()),
@@ -140,8 +148,10 @@ impl Run {
             bar.inc(1);
         });
         bar.finish_and_clear();
+        let mut failed = 0;
         if with_exhibits {
-            record.exhibits = self.exhibits();
+            let data = DataFolders::new(self.data.as_deref());
+            (record.exhibits, failed) = all_exhibits(exhibits::ALL, &data);
         }
         if self.record {
             // Pictures of real data are derived from geometry that may not be passed on; numbers may.
@@ -164,27 +174,14 @@ impl Run {
         let page = folder.join("report.html");
         super::output::write_whole(&page, &super::report::page(&record)?)?;
         say(&summary(&record));
+        if failed > 0 {
+            say(&format!("exhibits failed: {failed}"));
+        }
         say(&format!(
             "report: {}",
             std::path::absolute(&page)?.display()
         ));
-        Ok(record)
-    }
-
-    /// Every exhibit whose data are there; what cannot be made is told.
-    fn exhibits(&self) -> Vec<Exhibit> {
-        let data = DataFolders::new(self.data.as_deref());
-        let make = |&(name, make): &(&str, exhibits::Make)| match make(&data) {
-            Ok(exhibit) => {
-                say(&format!("exhibit {name}: {}", exhibit.title));
-                Some(exhibit)
-            }
-            Err(error) => {
-                say(&format!("exhibit {name}: skipped: {error}"));
-                None
-            }
-        };
-        exhibits::ALL.iter().filter_map(make).collect()
+        Ok(Done { record, failed })
     }
 
     /// The record's folder, made: as named, or the next free number of this day.
@@ -221,17 +218,31 @@ impl Run {
     }
 }
 
+/// Every exhibit whose data are there, and how many of them could not be made; what is not made is told.
+fn all_exhibits(makers: &[(&str, exhibits::Make)], data: &DataFolders) -> (Vec<Exhibit>, usize) {
+    let (mut made, mut failed) = (Vec::new(), 0);
+    for (name, make) in makers {
+        match make(data) {
+            Ok(exhibit) => {
+                say(&format!("exhibit {name}: {}", exhibit.title));
+                made.push(exhibit);
+            }
+            Err(error) if error.is_absence() => {
+                say(&format!("exhibit {name}: skipped: {error}"));
+            }
+            Err(error) => {
+                say(&format!("exhibit {name}: failed: {error}"));
+                failed += 1;
+            }
+        }
+    }
+    (made, failed)
+}
+
 /// One line a case: the engines by verdict, and the check nearest to its tolerance.
 fn line(case: &Case, judged: &[Judged]) -> String {
     let mut parts = vec![format!("{:<34}", case.name)];
-    for verdict in [
-        Verdict::Agree,
-        Verdict::Differ,
-        Verdict::Error,
-        Verdict::Timeout,
-        Verdict::Missing,
-        Verdict::Unsupported,
-    ] {
+    for verdict in Verdict::ALL {
         let names: Vec<&str> = judged
             .iter()
             .filter(|j| j.row.verdict == verdict)
@@ -271,14 +282,7 @@ fn line(case: &Case, judged: &[Judged]) -> String {
 /// What counts, by verdict, and the tables.
 fn summary(record: &Record) -> String {
     let mut counts = Vec::new();
-    for verdict in [
-        Verdict::Agree,
-        Verdict::Differ,
-        Verdict::Error,
-        Verdict::Timeout,
-        Verdict::Missing,
-        Verdict::Unsupported,
-    ] {
+    for verdict in Verdict::ALL {
         let count = record
             .agreement
             .iter()
@@ -393,4 +397,36 @@ fn machine() -> String {
         ),
     ]
     .join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exhibits::ExhibitError;
+
+    #[test]
+    fn only_absent_data_skip_an_exhibit() {
+        let makers: [(&str, exhibits::Make); 4] = [
+            ("made", |_| {
+                Ok(Exhibit {
+                    name: "made".into(),
+                    title: String::new(),
+                    look: String::new(),
+                    datasets: Vec::new(),
+                    panels: Vec::new(),
+                })
+            }),
+            ("absent", |data| {
+                Err(data.sequence("no such data").unwrap_err().into())
+            }),
+            ("damaged", |data| {
+                Err(data.sequence("@no-such-name").unwrap_err().into())
+            }),
+            ("refused", |_| {
+                Err(ExhibitError::of("refused")(std::fmt::Error))
+            }),
+        ];
+        let (made, failed) = all_exhibits(&makers, &DataFolders::default());
+        assert_eq!((made.len(), failed), (1, 2));
+    }
 }

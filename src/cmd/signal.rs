@@ -17,7 +17,8 @@ use faer::MatRef;
 use serde_json::json;
 
 use self::tables::placed_frames;
-use super::output::{check_not_input, check_place, draft_json, say};
+use super::output::{draft_json, say};
+use super::places::Places;
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
@@ -45,9 +46,12 @@ sequences that are long, or larger than memory. `signal sample` and `signal info
 
 Printed: (3), (4), (7) and (2), the sums of squares of section 3 of the paper: of frames against h,
 of shape coordinates against g, of pose-space positions against f, and of frames against all three,
-in the units of the shape space; the root mean square distance of vertices over the first frame's
-diagonal; that of Karni & Gotsman 2004; and the in-betweens that leave the neighbourhood of their
-frames by more than a quarter of a step.
+in the units of the shape space, squared; the root mean square distance of vertices over the first
+frame's diagonal; that of Karni & Gotsman 2004; and the in-betweens that leave the neighbourhood of
+their frames by more than a quarter of a step.
+
+--refine lowers (2). In other spaces than vertex space the distance of vertices may rise even so,
+since (2) is then of the space; both distances are told where k, l and m are given.
 
 The .npz holds h0 (d), H (m, d), sites (l, 2), g (l + 3, m), control (k, 2), u (k + 2), t (n), the
 frames' places p (n, 2), F (F, 3), meta; but for vertex space, reference (V, 3); in patch space,
@@ -123,7 +127,7 @@ pub struct FitVerb {
     /// a weight W from 0 to 1 for the latter, or mds (the paper's, by distances between poses)
     #[arg(long, default_value_t = Layout::default().to_string(), value_name = "LAYOUT")]
     layout: String,
-    /// CSV of pinned frames: frame (1-based), x, y; with a header line
+    /// CSV of pinned frames: frame (1-based), x, y in the units of the shape space, as `signal info --places` writes them; with a header line
     #[arg(long, value_name = "FILE")]
     pins: Option<PathBuf>,
     /// Lower the error of the whole chain jointly, from where its stages end
@@ -187,8 +191,15 @@ impl Allowed {
 /// A sequence or a window of one, fitted in some space.
 struct Fitted {
     found: SpaceFit,
-    refinement: Option<Refinement>,
+    refined: Option<Refined>,
     patches: Vec<i64>,
+}
+
+/// What refinement did.
+struct Refined {
+    told: Refinement,
+    /// The RMS distance of vertices before, where a single fit was refined.
+    rms_before: Option<f64>,
 }
 
 impl Fitted {
@@ -208,11 +219,7 @@ impl FitVerb {
     pub fn run(self) -> Outcome {
         let how = self.how()?;
         self.check_constants()?;
-        if let Some(out) = &self.out {
-            check_representation_place(out)?;
-            check_not_input(out, &[Path::new(&self.sequence)])?;
-        }
-        self.json.as_deref().map_or(Ok(()), check_place)?;
+        self.check_places()?;
         if let Some(value) = self.tolerance.filter(|t| !(*t > 0.0 && t.is_finite())) {
             return Err(FitError::BadTolerance { value }.into());
         }
@@ -226,11 +233,9 @@ impl FitVerb {
             None => Vec::new(),
         };
         let reference = self.reference(&sequence, how.space)?;
-        let fitted = self.fit(&sequence, &reference, how, pins, Allowed::of(&sequence))?;
-        let mut numbers = numbers(&sequence, &fitted.found, how);
-        if let Some(told) = &fitted.refinement {
-            numbers["refine"] = refine_numbers(told);
-        }
+        let fitted = self.fit(&sequence, &reference, how, pins, Allowed::of(&sequence));
+        let fitted = fitted.map_err(|e| format!("{}: {e}", self.sequence))?;
+        let numbers = numbers(&sequence, &fitted, how);
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -245,6 +250,19 @@ impl FitVerb {
             say(&note);
         }
         Ok(true)
+    }
+
+    fn check_places(&self) -> Result<(), Failure> {
+        let out = self.out.as_deref();
+        out.map_or(Ok(()), check_representation_name)?;
+        Places::default()
+            .reads_sequence("<SEQUENCE>", &self.sequence)
+            .reads("--reference", self.reference.as_ref())
+            .reads("--pins", self.pins.as_ref())
+            .writes("-o", out)
+            .writes("--json", self.json.as_ref())
+            .check()?;
+        Ok(())
     }
 
     /// An error unless something says how close the fit is to be, and nothing contradicts it.
@@ -274,9 +292,8 @@ impl FitVerb {
     }
 
     fn how(&self) -> Result<How, Failure> {
-        let knots = self.knots.parse();
         Ok(How {
-            knots: knots.map_err(|e| format!("{e}, found `{}`", self.knots))?,
+            knots: self.knots.parse()?,
             space: self.space.parse()?,
             layout: self.layout.parse()?,
         })
@@ -321,10 +338,10 @@ impl FitVerb {
             SpaceKind::Vertex => None,
             kind => Some(prepare(kind, mesh.clone(), reference, &patches)?),
         };
-        let (found, refinement) = self.fit_in(sequence, space.as_deref(), how, pins, allowed)?;
+        let (found, refined) = self.fit_in(sequence, space.as_deref(), how, pins, allowed)?;
         Ok(Fitted {
             found,
-            refinement,
+            refined,
             patches,
         })
     }
@@ -336,7 +353,7 @@ impl FitVerb {
         how: How,
         pins: Vec<Pin>,
         allowed: Allowed,
-    ) -> Result<(SpaceFit, Option<Refinement>), Failure> {
+    ) -> Result<(SpaceFit, Option<Refined>), Failure> {
         let How { knots, layout, .. } = how;
         let refine = self.refine.then(|| RefineOptions {
             between: self.between,
@@ -359,17 +376,21 @@ impl FitVerb {
         let Some(space) = space else {
             let frames = MatRef::from_column_major_slice(frames, d, n);
             let most = allowed.error(tolerance, d / 3);
+            let rms_of = |fit: &Fit| (fit.errors.psi / (n * d / 3) as f64).sqrt();
             let (fit, told) = match (&constants, &refine) {
                 (Some(options), None) => (fit(frames, options)?, None),
                 (Some(options), Some(how)) => {
-                    some(refine::refine(frames, fit(frames, options)?, how)?)
+                    let staged = fit(frames, options)?;
+                    let before = rms_of(&staged);
+                    refined(refine::refine(frames, staged, how)?, Some(before))
                 }
                 (None, None) => (fit_to_error(frames, most, knots, layout, &pins)?, None),
-                (None, Some(how)) => some(fit_to_error_refined(
-                    frames, most, knots, layout, &pins, how,
-                )?),
+                (None, Some(how)) => {
+                    let found = fit_to_error_refined(frames, most, knots, layout, &pins, how)?;
+                    refined(found, None)
+                }
             };
-            let rms = (fit.errors.psi / (n * d / 3) as f64).sqrt();
+            let rms = rms_of(&fit);
             return Ok((SpaceFit { fit, rms }, told));
         };
         let rms = allowed.rms(tolerance, n);
@@ -377,15 +398,18 @@ impl FitVerb {
             (Some(options), None) => (fit_in_space(space, frames, options)?, None),
             (Some(options), Some(how)) => {
                 let staged = fit_in_space(space, frames, options)?;
-                some(refine_in_space(space, frames, staged, how)?)
+                let before = staged.rms;
+                refined(refine_in_space(space, frames, staged, how)?, Some(before))
             }
             (None, None) => {
                 let fit = fit_in_space_to_rms(space, frames, rms, knots, layout, &pins)?;
                 (fit, None)
             }
-            (None, Some(how)) => some(fit_in_space_to_rms_refined(
-                space, frames, rms, knots, layout, &pins, how,
-            )?),
+            (None, Some(how)) => {
+                let found =
+                    fit_in_space_to_rms_refined(space, frames, rms, knots, layout, &pins, how)?;
+                refined(found, None)
+            }
         })
     }
 }
@@ -398,43 +422,64 @@ fn check_between(weight: f64) -> Result<(), Failure> {
     }
 }
 
-fn some<T, U>((fit, told): (T, U)) -> (T, Option<U>) {
-    (fit, Some(told))
+fn refined<T>((fit, told): (T, Refinement), rms_before: Option<f64>) -> (T, Option<Refined>) {
+    (fit, Some(Refined { told, rms_before }))
 }
 
-fn refine_numbers(told: &Refinement) -> serde_json::Value {
-    json!({
+/// What `--json` holds of a refinement; `size` is what distances are relative to.
+fn refine_numbers(refined: &Refined, size: f64) -> serde_json::Value {
+    let told = &refined.told;
+    let mut numbers = json!({
         "error_psi_before": told.before, "error_psi": told.after, "iterations": told.iterations,
         "gradient": told.gradient, "between": told.between, "time_ms": told.elapsed.as_secs_f64() * 1e3,
-    })
+    });
+    if let Some(rms) = refined.rms_before {
+        numbers["rms_relative_before"] = ratio(rms, size).into();
+    }
+    numbers
 }
 
 /// Everything that `--json` holds.
-fn numbers(sequence: &Sequence, found: &SpaceFit, how: How) -> serde_json::Value {
+fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value {
+    let found = &fitted.found;
     let fit = &found.fit;
+    let size = bounds(sequence.frame(0)).diagonal();
     let (k, l, m) = fit.klm();
     let (n, vertices) = (
         sequence.frame_count(),
         sequence.connectivity().vertex_count(),
     );
     let distance = found.rms * ((n * vertices) as f64).sqrt();
-    let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
-    let t = fit.timings;
-    json!({
+    let mut numbers = json!({
         "n": n, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "V": vertices, "F": sequence.connectivity().faces().len(),
         "space": how.space.name(), "knots": how.knots.to_string(),
         "layout": how.layout.to_string(), "layout_weight": fit.layout_weight,
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
-        "rms_relative": ratio(found.rms, bounds(sequence.frame(0)).diagonal()),
+        "rms_relative": ratio(found.rms, size),
         "kg_percent": 100.0 * ratio(distance, spread(sequence)),
         "stored_numbers": fit.representation.stored_numbers(),
         "mds_steps": {"majorising": fit.steps.majorising, "newton": fit.steps.newton, "inner": fit.steps.inner},
         "same_pose": fit.same_pose,
         "astray": astray(fit, 0),
-        "sites": fit.sites.order.iter().map(|i| i + 1).collect::<Vec<_>>(),
-        "time_ms": {"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)},
-    })
+        "time_ms": stage_times(fit),
+    });
+    match &fitted.refined {
+        Some(refined) => numbers["refine"] = refine_numbers(refined, size),
+        // Refinement moves sites off the frames; `signal info --json` tells where they are.
+        None => {
+            let frames: Vec<usize> = fit.sites.order.iter().map(|i| i + 1).collect();
+            numbers["sites"] = frames.into();
+        }
+    }
+    numbers
+}
+
+/// Milliseconds of each stage.
+fn stage_times(fit: &Fit) -> serde_json::Value {
+    let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+    let t = fit.timings;
+    json!({"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)})
 }
 
 /// The in-betweens that go astray, in frame times of the sequence in which `before` frames come before those of the fit.
@@ -446,6 +491,7 @@ fn astray(fit: &Fit, before: usize) -> Vec<serde_json::Value> {
         .collect()
 }
 
+/// Nothing is nothing of anything, also of nothing.
 fn ratio(value: f64, scale: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / scale }
 }
@@ -461,9 +507,12 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
     let t = |key: &str| v["time_ms"][key].as_f64().unwrap_or(f64::NAN);
     let refined = v.get("refine").map_or(String::new(), |r| {
         let number = |key: &str| r[key].as_f64().unwrap_or(f64::NAN);
+        let rms = r["rms_relative_before"].as_f64();
+        let rms = rms.map(|rms| format!(", relative RMS from {:.4}%", 100.0 * rms));
         format!(
-            "\nrefined: (2) from {:.5} in {} steps and {:.0} ms",
+            "\nrefined: (2) from {:.5}{} in {} steps and {:.0} ms",
             number("error_psi_before"),
+            rms.unwrap_or_default(),
             r["iterations"],
             number("time_ms")
         )
@@ -527,11 +576,13 @@ fn read_pins(path: &Path, n: usize) -> Result<Vec<Pin>, Failure> {
     Ok(pins)
 }
 
-/// An error where a representation could not be written: it is one .npz file.
-fn check_representation_place(path: &Path) -> Result<(), Failure> {
-    if path.extension().is_none_or(|e| e != "npz") {
-        let place = path.display();
-        return Err(format!("{place}: a representation is one .npz file; name it so").into());
+/// An error where a representation is not called what it is: one .npz file.
+fn check_representation_name(path: &Path) -> Result<(), Failure> {
+    match path.extension().is_some_and(|e| e == "npz") {
+        true => Ok(()),
+        false => {
+            let place = path.display();
+            Err(format!("{place}: a representation is one .npz file; name it so").into())
+        }
     }
-    Ok(check_place(path)?)
 }

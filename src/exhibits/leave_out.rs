@@ -1,5 +1,6 @@
 //! The leave-out test: every second frame predicted from the others, by layout, staged and refined, beside linear and cubic interpolation.
 
+use super::signals::present;
 use super::{Chart, Exhibit, ExhibitError, Line, Panel, Style, Table};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
@@ -23,25 +24,19 @@ const LAYOUTS: [Layout; 2] = [Layout::Mds, Layout::Ordered { weight: None }];
 
 /// A table over sequences, spaces and fits, and the trade-off between sites and in-betweens.
 pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
-    let mut rows = Vec::new();
-    let mut panels = Vec::new();
-    let mut datasets = Vec::new();
+    let mut sequences = Vec::new();
     for name in EMBEDDED {
-        let sequence = open(name)?;
-        rows.extend(both(name, &sequence)?);
-        panels.push(Panel::Chart(trade_off(name, &sequence)?));
-        datasets.push(name.to_owned());
+        sequences.push((name, open(name)?));
     }
-    for (name, count) in REAL {
-        let Ok(sequence) = data.sequence(name) else {
-            continue;
-        };
-        let count = count.min(sequence.frame_count());
-        let frames = &sequence.positions()[..count * sequence.dimension()];
-        let sequence = Sequence::new(sequence.connectivity().clone(), count, frames.to_vec())
-            .map_err(ExhibitError::of(NAME))?;
-        rows.extend(both(name, &sequence)?);
-        datasets.push(name.to_owned());
+    // Before the work, so that damaged data are told of at once.
+    sequences.extend(real(data)?);
+    let mut panels = Vec::new();
+    for (name, sequence) in &sequences[..EMBEDDED.len()] {
+        panels.push(Panel::Chart(trade_off(name, sequence)?));
+    }
+    let mut rows = Vec::new();
+    for (name, sequence) in &sequences {
+        rows.extend(both(name, sequence)?);
     }
     panels.insert(0, Panel::Table(table(rows)));
     Ok(Exhibit {
@@ -51,9 +46,23 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
                from their neighbours although every kept frame is met. `ordered` keeps frames in their order: interpolating or refined it stays below `linear`, \
                and refined it comes near `cubic` with fewer sites than frames."
             .into(),
-        datasets,
+        datasets: sequences.iter().map(|(name, _)| (*name).into()).collect(),
         panels,
     })
+}
+
+/// The sequences of [`REAL`] that there are.
+fn real(data: &DataFolders) -> Result<Vec<(&'static str, Sequence)>, ExhibitError> {
+    let mut found = Vec::new();
+    for (name, count) in REAL {
+        let Some(sequence) = present(data.sequence(name))? else {
+            continue;
+        };
+        let count = count.min(sequence.frame_count());
+        let some = sequence.select(&(0..count).collect::<Vec<_>>());
+        found.push((name, some.map_err(ExhibitError::of(NAME))?));
+    }
+    Ok(found)
 }
 
 fn both(name: &str, sequence: &Sequence) -> Result<[Vec<String>; 2], ExhibitError> {
@@ -147,4 +156,25 @@ fn trade_off(name: &str, sequence: &Sequence) -> Result<Chart, ExhibitError> {
         lines,
         ..Chart::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damaged_data_are_an_error_and_no_absence() {
+        let data = tempfile::tempdir().unwrap();
+        let folders = DataFolders(vec![data.path().into()]);
+        assert!(real(&folders).unwrap().is_empty());
+        std::fs::create_dir(data.path().join("cow")).unwrap();
+        std::fs::write(data.path().join("cow/1.obj"), "v 0 0\n").unwrap();
+        for exhibit in [exhibit, super::super::round_trip::exhibit] {
+            let error = exhibit(&folders).unwrap_err();
+            assert!(
+                !error.is_absence() && error.to_string().contains("cow"),
+                "{error}"
+            );
+        }
+    }
 }

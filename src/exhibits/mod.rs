@@ -137,6 +137,11 @@ impl ExhibitError {
             source: Box::new(source),
         }
     }
+
+    /// Whether there is no exhibit because there is no data, and nothing is wrong.
+    pub fn is_absence(&self) -> bool {
+        matches!(self, Self::Dataset(DatasetError::Absent { .. }))
+    }
 }
 
 /// Makes an exhibit from datasets.

@@ -42,7 +42,9 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
     };
     let (first, step) = (n / 3, (n / 60).max(1));
     let strip = |what: &str, times: &[f64], colour| {
-        let chosen: Vec<f64> = (0..SHOWN).map(|i| times[first + i * step]).collect();
+        // Fewer where the sequence ends before.
+        let chosen = times.iter().skip(first).step_by(step).take(SHOWN);
+        let chosen: Vec<f64> = chosen.copied().collect();
         let made = fit.representation.evaluate(&chosen);
         let title = format!("Frames {}, {}, ..., {what}", first + 1, first + 1 + step);
         let view = View::around_y(60.0, 15.0);
@@ -79,4 +81,23 @@ fn warp(i: f64, n: usize) -> f64 {
     let span = (n - 1) as f64;
     let u = (i - 1.0) / span;
     1.0 + span * (u - DEPTH * (TAU * SPELLS * u).sin() / (TAU * SPELLS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::dataset::open;
+    use crate::sequence::format::write;
+
+    #[test]
+    fn short_sequences_show_the_frames_they_have() {
+        let jelly = open("@jelly-small").unwrap();
+        for n in [4, 7, 11] {
+            let data = tempfile::tempdir().unwrap();
+            let frames: Vec<usize> = (0..n).collect();
+            write(&jelly.select(&frames).unwrap(), &data.path().join("cow")).unwrap();
+            let exhibit = exhibit(&DataFolders(vec![data.path().into()])).unwrap();
+            assert_eq!(exhibit.datasets, ["cow"]);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::signals::present;
 use super::{Exhibit, ExhibitError, Panel, Table};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
@@ -19,10 +20,10 @@ pub fn exhibit(data: &DataFolders) -> Result<Exhibit, ExhibitError> {
     for name in EMBEDDED {
         sequences.push((name, open(name)?));
     }
-    let real = REAL
-        .iter()
-        .filter_map(|&name| Some((name, data.sequence(name).ok()?)));
-    sequences.extend(real);
+    for name in REAL {
+        let found = present(data.sequence(name))?;
+        sequences.extend(found.map(|sequence| (name, sequence)));
+    }
     let rows: Result<Vec<_>, _> = sequences.iter().map(|(name, s)| row(name, s)).collect();
     Ok(Exhibit {
         name: NAME.into(),

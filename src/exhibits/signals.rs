@@ -13,9 +13,17 @@ pub fn either(
     real: &'static str,
     embedded: &'static str,
 ) -> Result<(&'static str, Sequence), DatasetError> {
-    match data.sequence(real) {
-        Ok(sequence) => Ok((real, sequence)),
-        Err(DatasetError::Absent { .. }) => Ok((embedded, data.sequence(embedded)?)),
+    match present(data.sequence(real))? {
+        Some(sequence) => Ok((real, sequence)),
+        None => Ok((embedded, data.sequence(embedded)?)),
+    }
+}
+
+/// What there is of a dataset, None where it is absent; damaged data stay an error.
+pub fn present<T>(found: Result<T, DatasetError>) -> Result<Option<T>, DatasetError> {
+    match found {
+        Ok(found) => Ok(Some(found)),
+        Err(DatasetError::Absent { .. }) => Ok(None),
         Err(other) => Err(other),
     }
 }

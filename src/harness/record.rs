@@ -37,6 +37,18 @@ pub enum Verdict {
     Unsupported,
 }
 
+impl Verdict {
+    /// Every verdict, in the order in which they are told.
+    pub const ALL: [Self; 6] = [
+        Self::Agree,
+        Self::Differ,
+        Self::Error,
+        Self::Timeout,
+        Self::Missing,
+        Self::Unsupported,
+    ];
+}
+
 impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(match self {

@@ -3,7 +3,7 @@
 use super::format::count;
 use super::markup::{section, strip_tags};
 use super::order::{RUST, distinct};
-use super::verdicts::{VERDICTS, badge, class, counts, meaning, symbol};
+use super::verdicts::{badge, class, counts, meaning, symbol};
 use super::{
     PublishedRow, accuracy, engines, exhibits, pictures, summary, table1, timing, verdicts,
 };
@@ -153,7 +153,7 @@ fn unchecked(n: usize) -> String {
 
 /// How many answers have each verdict, with what it means.
 fn tally(rows: &[AgreementRow]) -> String {
-    let items: String = VERDICTS
+    let items: String = Verdict::ALL
         .iter()
         .zip(counts(rows))
         .map(|(&verdict, n)| {

@@ -7,16 +7,6 @@ use super::markup::{Cell, Group, Table, escape, name};
 use super::order::{distinct, engines};
 use crate::harness::record::{AgreementRow, Verdict};
 
-/// Every verdict, in the order in which they are told.
-pub(super) const VERDICTS: [Verdict; 6] = [
-    Verdict::Agree,
-    Verdict::Differ,
-    Verdict::Error,
-    Verdict::Timeout,
-    Verdict::Missing,
-    Verdict::Unsupported,
-];
-
 /// A sign beside the word and the colour, for who cannot tell the colours apart.
 pub(super) fn symbol(verdict: Verdict) -> &'static str {
     match verdict {
@@ -62,9 +52,9 @@ pub(super) fn badge(verdict: Verdict) -> String {
     )
 }
 
-/// How many rows have each verdict, in the order of [`VERDICTS`].
+/// How many rows have each verdict, in the order of [`Verdict::ALL`].
 pub(super) fn counts(rows: &[AgreementRow]) -> [usize; 6] {
-    VERDICTS.map(|v| rows.iter().filter(|r| r.verdict == v).count())
+    Verdict::ALL.map(|v| rows.iter().filter(|r| r.verdict == v).count())
 }
 
 /// A row's worst difference over its tolerance; a tolerance of 0 allows 0 only.
@@ -155,7 +145,7 @@ fn explanation(row: &AgreementRow) -> String {
 /// What stands behind every verdict that is not agree, in full; those that said the same are told once.
 pub(super) fn messages(rows: &[AgreementRow]) -> String {
     let mut items = String::new();
-    for verdict in VERDICTS {
+    for verdict in Verdict::ALL {
         let told = |r: &&AgreementRow| {
             r.verdict == verdict && (verdict != Verdict::Agree || !r.message.is_empty())
         };

@@ -63,9 +63,10 @@ impl DataFolders {
     pub fn examples(&self, name: &str, count: usize) -> Result<Sequence, DatasetError> {
         let poses = self.sequence(name)?;
         let file = format!("{name}.obj");
-        let rest = match name.starts_with('@') {
-            true => Vec::new(),
-            false => self.files(REST).unwrap_or_default(),
+        let rest = match self.files(REST) {
+            _ if name.starts_with('@') => Vec::new(),
+            Err(DatasetError::Absent { .. }) => Vec::new(),
+            found => found?,
         };
         let mut positions = match rest.iter().find(|path| path.ends_with(&file)) {
             Some(path) => read(path)?.positions().to_vec(),

@@ -28,19 +28,23 @@ pub enum KnotError {
         most: usize,
         parameters: usize,
     },
-    /// A knot rule that does not exist.
-    #[error("unknown knot rule, expected `literal` or `symmetric`")]
-    UnknownRule,
+}
+
+/// A knot rule that does not exist.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("unknown knot rule `{name}`, expected `literal` or `symmetric`")]
+pub struct UnknownRule {
+    pub name: String,
 }
 
 impl FromStr for KnotRule {
-    type Err = KnotError;
+    type Err = UnknownRule;
 
-    fn from_str(name: &str) -> Result<Self, KnotError> {
+    fn from_str(name: &str) -> Result<Self, UnknownRule> {
         match name {
             "literal" => Ok(Self::Literal),
             "symmetric" => Ok(Self::Symmetric),
-            _ => Err(KnotError::UnknownRule),
+            _ => Err(UnknownRule { name: name.into() }),
         }
     }
 }

@@ -28,7 +28,7 @@ fn constants_out_of_range_on_each_side() {
     let klm = |k, l, m, words: &[&str]| fit(&scratch, &["--k", k, "--l", l, "--m", m], words);
     klm("3", "3", "2", &["k = 3", "4 <= k <= 8", "6 frames"]);
     klm("9", "3", "2", &["k = 9", "4 <= k <= 8"]);
-    klm("4", "2", "2", &["l = 2", "3 <= l <= 6"]);
+    klm("4", "2", "2", &["good.npz: ", "l = 2", "3 <= l <= 6"]);
     klm("4", "7", "2", &["l = 7", "3 <= l <= 6"]);
     klm("4", "3", "6", &["m = 6", "0 <= m <= 5"]);
     klm("4", "3", "-1", &["--m", "-1", "0 to n - 1"]);
@@ -61,7 +61,7 @@ fn fewer_than_four_frames() {
     let scratch = Scratch::new();
     for n in 1..4 {
         write(&sheet(n, 4, 3), &scratch.at("good.npz")).unwrap();
-        let words = ["at least 4 frames", &format!("found {n}")];
+        let words = ["good.npz: ", "at least 4 frames", &format!("found {n}")];
         fit(&scratch, &["--k", "4", "--l", "3", "--m", "0"], &words);
         fit(&scratch, &["--tolerance", "0.01"], &words);
     }

@@ -4,7 +4,9 @@ use std::fs;
 use std::os::unix::fs::FileTypeExt;
 use std::process::Command;
 
-use super::common::{MESHSEQ, Scratch, text};
+use meshseq::sequence::format::write;
+
+use super::common::{MESHSEQ, Scratch, sheet, text};
 use super::{assert_refusal, good, refused};
 
 /// Every verb that writes, to this place: with its other outputs good, which must not be written either.
@@ -89,6 +91,241 @@ fn what_is_read_is_not_written_over() {
     }
     let onto_itself = ["convert", &frames, &frames, "--every", "2"];
     refused(scratch.path(), &onto_itself, &["it is what is read"]);
+}
+
+/// A command whose arguments with a dot or slash in them are files of the folder.
+fn command(scratch: &Scratch, arguments: &str) -> Vec<String> {
+    let words = arguments.split_whitespace();
+    let is_file = |word: &str| word.contains(['.', '/']) && word.parse::<f64>().is_err();
+    words
+        .map(|word| match is_file(word) {
+            true => scratch.arg(word),
+            false => word.to_owned(),
+        })
+        .collect()
+}
+
+/// Everything that any verb reads.
+fn inputs() -> Scratch {
+    let scratch = good();
+    for (name, text) in [
+        (
+            "edits.toml",
+            "[[edit]]\ndo = \"reverse\"\nframes = \"1..3\"\n",
+        ),
+        ("pins.csv", "frame,x,y\n1,0,0\n"),
+        ("poses.csv", "frame,x,y\n1,0,0\n3,1,0\n5,0,1\n"),
+        ("curve.csv", "x,y\n0,0\n1,1\n2,0\n"),
+        ("warp.csv", "frame,time\n1,1\n9,6\n"),
+        ("times.txt", "1,2,3"),
+    ] {
+        fs::write(scratch.at(name), text).unwrap();
+    }
+    let good = scratch.arg("good.npz");
+    for name in ["frames", "cache.pc2"] {
+        super::common::must(&["convert", &good, &scratch.arg(name)]);
+    }
+    let rest = scratch.arg("rest.obj");
+    super::common::must(&["convert", &good, &rest, "--frames", "1..1"]);
+    scratch
+}
+
+#[test]
+fn no_result_takes_the_place_of_an_input() {
+    let scratch = inputs();
+    let klm = "--k 6 --l 5 --m 3";
+    let transfer = "signal transfer rep.npz --examples good.npz other.npz --rest rest.obj rest.obj";
+    write(&sheet(6, 4, 3), &scratch.at("other.npz")).unwrap();
+    for (arguments, option, input) in [
+        ("info good.npz --json good.npz", "--json", "<SEQUENCE>"),
+        (
+            "info good.npz --quality good.npz",
+            "--quality",
+            "<SEQUENCE>",
+        ),
+        (
+            "info frames/ --json frames/0002.obj",
+            "--json",
+            "<SEQUENCE>",
+        ),
+        (
+            "info frames/000?.obj --quality frames/0006.obj",
+            "--quality",
+            "<SEQUENCE>",
+        ),
+        ("info cache.pc2 --json cache.obj", "--json", "<SEQUENCE>"),
+        ("convert rest.obj rest.pc2", "<OUT>", "<SEQUENCE>"),
+        (
+            "signal fit frames/ KLM -o new.npz --json frames/0001.obj",
+            "--json",
+            "<SEQUENCE>",
+        ),
+        (
+            "signal fit good.npz KLM --window 6 --json good.npz",
+            "--json",
+            "<SEQUENCE>",
+        ),
+        (
+            "signal fit good.npz KLM --pins pins.csv --json pins.csv",
+            "--json",
+            "--pins",
+        ),
+        (
+            "signal fit good.npz KLM --space gradient --reference rest.obj --json rest.obj",
+            "--json",
+            "--reference",
+        ),
+        (
+            "signal fit good.npz KLM --space gradient --reference other.npz -o other.npz",
+            "-o",
+            "--reference",
+        ),
+        (
+            "signal info rep.npz --json rep.npz",
+            "--json",
+            "<REPRESENTATION>",
+        ),
+        (
+            "signal info rep.npz --places rep.npz",
+            "--places",
+            "<REPRESENTATION>",
+        ),
+        (
+            "signal info rep.npz --plot rep.npz",
+            "--plot",
+            "<REPRESENTATION>",
+        ),
+        (
+            "signal leave-out good.npz --json good.npz",
+            "--json",
+            "<SEQUENCE>",
+        ),
+        (
+            "signal sample rep.npz -o new.npz --json rep.npz",
+            "--json",
+            "<REPRESENTATION>",
+        ),
+        (
+            "signal sample rep.npz --warp warp.csv -o new.npz --json warp.csv",
+            "--json",
+            "--warp",
+        ),
+        (
+            "signal sample rep.npz --times times.txt -o new.npz --json times.txt",
+            "--json",
+            "--times",
+        ),
+        (
+            "signal edit rep.npz edits.toml -o new.npz --json rep.npz",
+            "--json",
+            "<REPRESENTATION>",
+        ),
+        (
+            "signal edit rep.npz edits.toml -o new.npz --json edits.toml",
+            "--json",
+            "<EDITS>",
+        ),
+        ("TRANSFER -o new.npz --json rep.npz", "--json", "<SOURCE>"),
+        (
+            "TRANSFER -o new.npz --json other.npz",
+            "--json",
+            "--examples",
+        ),
+        ("TRANSFER -o new.npz --rep other.npz", "--rep", "--examples"),
+        ("TRANSFER -o rest.obj", "-o", "--rest"),
+        (
+            "signal design poses.csv curve.csv good.npz -o new.npz --json poses.csv",
+            "--json",
+            "<POSES>",
+        ),
+        (
+            "signal design poses.csv curve.csv good.npz -o new.npz --json curve.csv",
+            "--json",
+            "<CURVE>",
+        ),
+        (
+            "signal design poses.csv curve.csv good.npz -o new.npz --rep good.npz",
+            "--rep",
+            "<SEQ>",
+        ),
+    ] {
+        let arguments = arguments.replace("KLM", klm).replace("TRANSFER", transfer);
+        let arguments = command(&scratch, &arguments);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let begins = format!("meshseq: {option} ");
+        let words = [&begins, "it is what is read", input, "another place"];
+        refused(scratch.path(), &arguments, &words);
+    }
+}
+
+#[test]
+fn no_two_results_go_to_one_place() {
+    let scratch = inputs();
+    let klm = "--k 6 --l 5 --m 3";
+    let transfer = "signal transfer rep.npz --examples good.npz good.npz";
+    let design = "signal design poses.csv curve.csv good.npz";
+    for (arguments, first, second) in [
+        (
+            "info good.npz --json q.x --quality q.x",
+            "--json",
+            "--quality",
+        ),
+        (
+            "signal fit good.npz KLM -o new.npz --json new.npz",
+            "-o",
+            "--json",
+        ),
+        (
+            "signal fit good.npz KLM --window 6 -o new.npz --json new.npz",
+            "-o",
+            "--json",
+        ),
+        (
+            "signal info rep.npz --json q.x --places q.x",
+            "--json",
+            "--places",
+        ),
+        (
+            "signal info rep.npz --places q.x --plot ./q.x",
+            "--places",
+            "--plot",
+        ),
+        (
+            "signal sample rep.npz -o new.npz --json new.npz",
+            "-o",
+            "--json",
+        ),
+        (
+            "signal sample rep.npz -o new.pc2 --json new.obj",
+            "-o",
+            "--json",
+        ),
+        (
+            "signal edit rep.npz edits.toml -o new.npz --json new.npz",
+            "-o",
+            "--json",
+        ),
+        ("TRANSFER -o new.npz --rep new.npz", "-o", "--rep"),
+        ("TRANSFER -o new.npz --json new.npz", "-o", "--json"),
+        (
+            "TRANSFER -o fine.npz --rep new.npz --json new.npz",
+            "--rep",
+            "--json",
+        ),
+        ("DESIGN -o new.npz --rep new.npz", "-o", "--rep"),
+        (
+            "DESIGN -o fine.npz --rep new.npz --json new.npz",
+            "--rep",
+            "--json",
+        ),
+    ] {
+        let arguments = arguments.replace("KLM", klm).replace("TRANSFER", transfer);
+        let arguments = command(&scratch, &arguments.replace("DESIGN", design));
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let begins = format!("meshseq: {second} ");
+        let words = [&begins, first, "same place", "name two"];
+        refused(scratch.path(), &arguments, &words);
+    }
 }
 
 #[test]

@@ -154,6 +154,25 @@ fn times_and_warps_that_cannot_be_sampled() {
 }
 
 #[test]
+fn frames_that_cannot_be_left_out() {
+    let scratch = good();
+    let short = ["good.npz: ", "at least 7 frames", "found 6"];
+    bad(&scratch, "leave-out good.npz --json new.json", &short);
+    write(&sheet(9, 4, 3), &scratch.at("long.npz")).unwrap();
+    let refuse = |choice: &str, words: &[&str]| {
+        bad(
+            &scratch,
+            &format!("leave-out long.npz --json new.json {choice}"),
+            words,
+        );
+    };
+    refuse("--shares=2", &["--shares 2", "at most 1"]);
+    refuse("--knots even", &["`even`", "literal"]);
+    refuse("--layout flat", &["flat"]);
+    refuse("--refine --between=-1", &["--between", "0 or more"]);
+}
+
+#[test]
 fn examples_that_pair_nothing() {
     let scratch = good();
     write(&sheet(5, 3, 3), &scratch.at("other.npz")).unwrap();
@@ -193,9 +212,17 @@ fn examples_that_pair_nothing() {
         "rep.npz --examples good.npz good.npz --k 5",
         &["--k", "stay"],
     );
+    for rule in ["literal", "symmetric"] {
+        let arguments = format!("rep.npz --examples good.npz good.npz --knots {rule}");
+        transfer(&arguments, &["--knots", rule, "rep.npz keeps its knots"]);
+    }
+    transfer(
+        "good.npz --examples good.npz good.npz --knots even",
+        &["`even`", "literal", "symmetric"],
+    );
     transfer(
         "good.npz --examples good.npz good.npz --k 99",
-        &["k = 99", "4 <= k <= 8"],
+        &["good.npz: ", "k = 99", "4 <= k <= 8"],
     );
     transfer("good.npz --examples good.npz", &["2 values"]);
     for onto in ["rep.npz", "good.npz"] {

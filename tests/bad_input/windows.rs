@@ -59,7 +59,7 @@ fn windows_that_cannot_be() {
     refused(
         scratch.path(),
         &[&start[..], &choice, &["-o", &out]].concat(),
-        &["window 1, frames 1 to", "k = 15", "<= k <="],
+        &["@roam-small:30: window 1, frames 1 to", "k = 15", "<= k <="],
     );
     for name in ["@roam-small:0", "@roam-small:x", "@gallop:100"] {
         fit(

@@ -1,11 +1,12 @@
 //! `signal design` (section 4.4).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
 
 use super::super::output::say;
+use super::super::places::Places;
 use super::super::{Outcome, whole};
 use super::result::Outputs;
 use super::tables::{pairs, placed_frames};
@@ -52,8 +53,11 @@ pub struct DesignVerb {
 impl DesignVerb {
     pub fn run(self) -> Outcome {
         let kind: SpaceKind = self.space.parse()?;
-        let inputs: [&Path; 3] = [&self.poses, &self.curve, Path::new(&self.sequence)];
-        self.outputs.check(&inputs)?;
+        let reads = Places::default()
+            .reads("<POSES>", Some(&self.poses))
+            .reads("<CURVE>", Some(&self.curve))
+            .reads_sequence("<SEQ>", &self.sequence);
+        self.outputs.check(reads)?;
         let sequence = open(&self.sequence)?;
         let placed = placed_frames(&self.poses, "poses")?;
         validate_pins(&placed, sequence.frame_count())
@@ -66,9 +70,10 @@ impl DesignVerb {
         let poses = frames.iter().flat_map(|&i| sequence.frame(i));
         let poses: Vec<f64> = rest.iter().chain(poses).copied().collect();
         let mesh = sequence.connectivity();
-        let patches = patches_for(kind, mesh, rest, &poses)?;
-        let space = prepare(kind, mesh.clone(), rest, &patches)?;
-        let z = encode_examples(&*space, &poses)?;
+        let of_sequence = |e| format!("{}: {e}", self.sequence);
+        let patches = patches_for(kind, mesh, rest, &poses).map_err(of_sequence)?;
+        let space = prepare(kind, mesh.clone(), rest, &patches).map_err(of_sequence)?;
+        let z = encode_examples(&*space, &poses).map_err(of_sequence)?;
         let options = DesignOptions {
             frames: self.frames,
             closed: self.closed,

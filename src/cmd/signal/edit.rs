@@ -6,7 +6,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::super::Outcome;
-use super::super::output::{check_not_input, check_place, draft_json, say};
+use super::super::output::{draft_json, say};
+use super::super::places::Places;
 use super::tables::read_text;
 use crate::signal::edit::edit;
 use crate::signal::edits_toml::parse;
@@ -32,7 +33,7 @@ points are.";
 
 #[derive(Args)]
 pub struct EditVerb {
-    /// A representation that `signal fit` wrote
+    /// A representation: what `signal fit` or `edit` wrote, or `transfer` or `design` with --rep
     representation: PathBuf,
     /// The edits, in order
     edits: PathBuf,
@@ -46,9 +47,13 @@ pub struct EditVerb {
 
 impl EditVerb {
     pub fn run(self) -> Outcome {
-        super::check_representation_place(&self.out)?;
-        check_not_input(&self.out, &[&self.representation, &self.edits])?;
-        self.json.as_deref().map_or(Ok(()), check_place)?;
+        super::check_representation_name(&self.out)?;
+        Places::default()
+            .reads("<REPRESENTATION>", Some(&self.representation))
+            .reads("<EDITS>", Some(&self.edits))
+            .writes("-o", Some(&self.out))
+            .writes("--json", self.json.as_ref())
+            .check()?;
         let stored = load(&self.representation)?;
         let place = self.edits.display();
         let edits = parse(&read_text(&self.edits, "edits")?);

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::check_between;
-use crate::cmd::output::{check_place, draft_json, say};
-use crate::cmd::{FrameChoice, Outcome};
+use super::{check_between, ratio};
+use crate::cmd::output::{draft_json, progress, say};
+use crate::cmd::places::Places;
+use crate::cmd::{Failure, FrameChoice, Outcome};
 use crate::mesh::measure::bounds;
+use crate::sequence::Sequence;
 use crate::shape::{SpaceKind, prepare_for};
 use crate::signal::knots::KnotRule;
 use crate::signal::layout::Layout;
@@ -57,50 +59,72 @@ pub struct LeaveOutVerb {
     json: Option<PathBuf>,
 }
 
+/// What is compared, and in which space.
+struct How {
+    space: SpaceKind,
+    knots: KnotRule,
+    layouts: Vec<Layout>,
+}
+
 impl LeaveOutVerb {
     pub fn run(self) -> Outcome {
-        let knots: KnotRule = self
-            .knots
-            .parse()
-            .map_err(|e| format!("{e}, found `{}`", self.knots))?;
-        let layouts: Vec<Layout> = self
-            .layout
-            .iter()
-            .map(|name| name.parse())
-            .collect::<Result<_, _>>()?;
-        let kind: SpaceKind = self.space.parse()?;
+        let how = self.how()?;
+        Places::default()
+            .reads_sequence("<SEQUENCE>", &self.sequence)
+            .writes("--json", self.json.as_ref())
+            .check()?;
+        let sequence = self.frames.open(&self.sequence)?;
+        let numbers = self.compare(&sequence, &how);
+        let numbers = numbers.map_err(|e| format!("{}: {e}", self.sequence))?;
+        if let Some(path) = &self.json {
+            draft_json(path, &numbers)?.keep()?;
+        }
+        say(&describe(&self.sequence, &numbers));
+        Ok(true)
+    }
+
+    fn how(&self) -> Result<How, Failure> {
         if let Some(share) = self.shares.iter().find(|s| !(**s > 0.0 && **s <= 1.0)) {
             return Err(format!("--shares {share}: expected shares above 0, at most 1").into());
         }
         check_between(self.between)?;
-        self.json.as_deref().map_or(Ok(()), check_place)?;
-        let sequence = self.frames.open(&self.sequence)?;
+        let layouts: Result<_, _> = self.layout.iter().map(|name| name.parse()).collect();
+        Ok(How {
+            space: self.space.parse()?,
+            knots: self.knots.parse()?,
+            layouts: layouts?,
+        })
+    }
+
+    /// Everything that `--json` holds.
+    fn compare(&self, sequence: &Sequence, how: &How) -> Result<Value, Failure> {
         let size = bounds(sequence.frame(0)).diagonal();
         let split = Split::new(sequence.positions(), sequence.dimension())?;
-        let space = prepare_for(kind, sequence.connectivity(), &split.kept)?;
+        let space = prepare_for(how.space, sequence.connectivity(), &split.kept)?;
         let test = LeaveOut::new(&*space, &split)?;
         let refinement = RefineOptions {
             between: self.between,
             ..RefineOptions::default()
         };
         let refinement = self.refine.then_some(&refinement);
+        let bar = progress(how.layouts.len() * self.shares.len());
         let mut fits = Vec::new();
-        for &layout in &layouts {
-            let mut rows = test.trade_off(&self.shares, layout, knots, refinement)?;
+        for &layout in &how.layouts {
+            let mut rows = Vec::new();
+            for &share in &self.shares {
+                rows.extend(test.trade_off(&[share], layout, how.knots, refinement)?);
+                bar.inc(1);
+            }
             rows.sort_by_key(|row| row.refined);
             fits.extend(rows.iter().map(|row| numbers(row, layout, size)));
         }
-        let numbers = json!({
-            "n": sequence.frame_count(), "kept": test.kept(), "space": kind.name(), "knots": knots.to_string(),
-            "linear": relative(test.linear()?.rms, size),
-            "cubic": relative(test.cubic()?.rms, size),
+        bar.finish_and_clear();
+        Ok(json!({
+            "n": sequence.frame_count(), "kept": test.kept(), "space": how.space.name(), "knots": how.knots.to_string(),
+            "linear": ratio(test.linear()?.rms, size),
+            "cubic": ratio(test.cubic()?.rms, size),
             "signals": fits,
-        });
-        if let Some(path) = &self.json {
-            draft_json(path, &numbers)?.keep()?;
-        }
-        say(&describe(&self.sequence, &numbers));
-        Ok(true)
+        }))
     }
 }
 
@@ -108,12 +132,8 @@ fn numbers(row: &TradeOff, layout: Layout, size: f64) -> Value {
     let (k, l, m) = row.klm;
     json!({
         "layout": layout.to_string(), "layout_weight": row.weight, "refined": row.refined, "share": row.share, "k": k, "l": l, "m": m,
-        "rms_relative": relative(row.missed, size), "error_g": row.errors.g, "error_psi": row.errors.psi,
+        "rms_relative": ratio(row.missed, size), "error_g": row.errors.g, "error_psi": row.errors.psi,
     })
-}
-
-fn relative(rms: f64, size: f64) -> f64 {
-    if rms == 0.0 { 0.0 } else { rms / size }
 }
 
 fn describe(name: &str, v: &Value) -> String {

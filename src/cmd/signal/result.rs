@@ -6,7 +6,8 @@ use clap::Args;
 use serde_json::Value;
 
 use super::super::Failure;
-use super::super::output::{check_not_input, check_parent, check_place, draft_json};
+use super::super::output::draft_json;
+use super::super::places::Places;
 use super::sample::frames_at;
 use crate::mesh::orientation::Orientation;
 use crate::sequence::format::write;
@@ -35,23 +36,16 @@ pub fn advice(numbers: &Value, kind: SpaceKind) -> &'static str {
 }
 
 impl Outputs {
-    /// Refuses places that nothing could be written to, and those of the verb's inputs; to be asked before long work.
-    pub fn check(&self, inputs: &[&Path]) -> Result<(), Failure> {
-        check_parent(&self.out)?;
-        for out in self.rep.iter().chain([&self.out]) {
-            check_not_input(out, inputs)?;
-        }
-        if let Some(rep) = &self.rep {
-            super::check_representation_place(rep)?;
-            if rep == &self.out {
-                let place = rep.display();
-                return Err(format!(
-                    "{place}: -o and --rep name one file; frames and representation are two"
-                )
-                .into());
-            }
-        }
-        Ok(self.json.as_deref().map_or(Ok(()), check_place)?)
+    /// Refuses places that nothing could be written to, and those of what the verb reads; to be asked before long work.
+    pub fn check(&self, reads: Places) -> Result<(), Failure> {
+        let rep = self.rep.as_deref();
+        rep.map_or(Ok(()), super::check_representation_name)?;
+        reads
+            .writes_sequence("-o", &self.out)
+            .writes("--rep", rep)
+            .writes("--json", self.json.as_ref())
+            .check()?;
+        Ok(())
     }
 
     /// Writes everything; `numbers` are those of the verb, to which faces are added that are inside out beside the first of `examples` (3V positions each)

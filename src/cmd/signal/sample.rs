@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::super::output::{check_not_input, check_place, draft_json, say};
+use super::super::output::{draft_json, progress, say};
+use super::super::places::Places;
 use super::super::{Failure, Outcome, whole};
 use super::tables::{numbers, pairs, read_text};
 use crate::sequence::Sequence;
 use crate::sequence::format::{FormatError, FrameWriter};
+use crate::shape::ShapeError;
 use crate::signal::file::{AT_A_TIME, Stored};
 use crate::signal::resample::{at_rate, check, evenly, warped};
 use crate::signal::windows_file::WindowsFile;
@@ -24,7 +26,7 @@ pub const EXAMPLES: &str = "Examples:
 
 #[derive(Args)]
 pub struct SampleVerb {
-    /// A representation that `signal fit` wrote
+    /// A representation: what `signal fit` or `edit` wrote, or `transfer` or `design` with --rep
     representation: PathBuf,
     /// Number of frames, evenly spaced over [1, n]; as many as were fitted if not given
     #[arg(long, alias = "count", value_name = "N", allow_negative_numbers = true, value_parser = whole("1 or more"))]
@@ -53,8 +55,13 @@ pub struct SampleVerb {
 
 impl SampleVerb {
     pub fn run(self) -> Outcome {
-        self.json.as_deref().map_or(Ok(()), check_place)?;
-        check_not_input(&self.out, &[&self.representation])?;
+        Places::default()
+            .reads("<REPRESENTATION>", Some(&self.representation))
+            .reads("--times", self.times.as_ref())
+            .reads("--warp", self.warp.as_ref())
+            .writes_sequence("-o", &self.out)
+            .writes("--json", self.json.as_ref())
+            .check()?;
         let mut file = WindowsFile::open(&self.representation)?;
         let n = file.plan().frame_count();
         let times = self.times(n)?;
@@ -65,10 +72,13 @@ impl SampleVerb {
             "space": file.space().name(),
         });
         let mut writer = FrameWriter::create(&self.out, &mesh, times.len())?;
+        let bar = progress(times.len());
         for some in times.chunks(AT_A_TIME) {
             let frames = file.sample(some)?;
             writer.push(&frames).map_err(|e| self.sampled(e))?;
+            bar.inc(some.len() as u64);
         }
+        bar.finish_and_clear();
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
         writer.finish()?;
@@ -130,10 +140,21 @@ fn listed(given: &str) -> Result<Vec<f64>, Failure> {
 /// Frames of a representation at these times; `path` is where it came from.
 pub fn frames_at(stored: &Stored, times: &[f64], path: &Path) -> Result<Sequence, Failure> {
     check_memory(times.len(), stored.representation.dimension())?;
-    let frames = stored.sample(times);
-    let frames = frames.map_err(|e| format!("{}: {e}", path.display()))?;
+    let frames = decoded(stored, times).map_err(|e| format!("{}: {e}", path.display()))?;
     let sequence = Sequence::new(stored.connectivity.clone(), times.len(), frames);
     Ok(sequence.map_err(|e| format!("{}: sampled, {e}", path.display()))?)
+}
+
+fn decoded(stored: &Stored, times: &[f64]) -> Result<Vec<f64>, ShapeError> {
+    let space = stored.prepare()?;
+    let bar = progress(times.len());
+    let mut frames = Vec::with_capacity(times.len() * 3 * stored.connectivity.vertex_count());
+    for some in times.chunks(AT_A_TIME) {
+        frames.extend(stored.sample_in(space.as_deref(), some)?);
+        bar.inc(some.len() as u64);
+    }
+    bar.finish_and_clear();
+    Ok(frames)
 }
 
 /// An error where that many frames of d numbers do not fit into memory.

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use clap::Args;
 use faer::{Mat, MatRef};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::super::output::say;
+use super::super::places::Places;
 use super::super::{Failure, FrameChoice, Outcome, whole};
 use super::result::Outputs;
 use crate::harness::case::Frames;
@@ -29,7 +30,10 @@ pub const EXAMPLES: &str = "Examples:
 
 Examples pair frame by frame; the first shows both meshes in a reference pose. What they miss is the
 share of the motion's spread about its mean that no mixture of them shows: near 0% the transfer
-is faithful, and where it is large more examples help, from other moments of the motion.";
+is faithful, and where it is large more examples help, from other moments of the motion.
+
+The frames of a sequence are laid out by the paper's scaling, as by `--layout mds` of `signal fit`;
+for another layout fit the sequence first and give its representation.";
 
 #[derive(Args)]
 pub struct TransferVerb {
@@ -58,9 +62,9 @@ pub struct TransferVerb {
     /// Sites of the pose signal of a sequence, 3 to n; n if not given
     #[arg(long, allow_negative_numbers = true, value_parser = whole("3 to n for n frames"))]
     l: Option<usize>,
-    /// How knots average parameters: symmetric or literal
-    #[arg(long, default_value = "symmetric", value_name = "RULE")]
-    knots: String,
+    /// How knots average parameters in the time signal of a sequence: symmetric, which is the default, or literal
+    #[arg(long, value_name = "RULE")]
+    knots: Option<String>,
     #[command(flatten)]
     frames: FrameChoice,
     #[command(flatten)]
@@ -86,101 +90,112 @@ struct Motion {
 
 impl TransferVerb {
     pub fn run(self) -> Outcome {
-        let knots: KnotRule = self
-            .knots
-            .parse()
-            .map_err(|e| format!("{e}, found `{}`", self.knots))?;
-        let asked: Option<SpaceKind> = self.space.as_deref().map(str::parse).transpose()?;
-        let rest = self.rest.iter().flatten();
-        let inputs = [&self.source].into_iter().chain(&self.examples).chain(rest);
-        let inputs: Vec<&Path> = inputs.map(Path::new).collect();
-        self.outputs.check(&inputs)?;
+        let knots = self.knots.as_deref().map(str::parse).transpose()?;
+        self.outputs.check(self.reads())?;
         let path = Path::new(&self.source);
         let stored = is_representation(path).then(|| load(path)).transpose()?;
-        let kind = self.space_of(stored.as_ref(), asked)?;
-        let [a, b] = [0, 1].map(|side| self.examples(side));
-        let (a, b) = (a?, b?);
-        if a.frame_count() != b.frame_count() {
-            return Err(format!(
-                "--examples: {} of {} but {} of {}; they pair frame by frame, so give as many of each",
-                a.frame_count(),
-                self.examples[0],
-                b.frame_count(),
-                self.examples[1]
-            )
-            .into());
-        }
-        let space = stored
-            .as_ref()
-            .map(|s| (s.reference.clone(), s.patches.clone()));
-        let a = encoded(a, kind, space)?;
-        let b = encoded(b, kind, None)?;
-        let motion = match &stored {
-            Some(stored) => self.kept(stored, &a)?,
-            None => self.fitted(&a, knots)?,
-        };
-        let target = b.sequence.frame(0).to_vec();
-        let representation = replace_shape(motion.over_examples, b.z.as_ref())?;
-        let numbers = json!({
-            "n": representation.time.frame_count(), "m": representation.basis.ncols(), "rank": motion.rank,
-            "k": representation.time.spline.control.len(), "l": representation.pose.site_count(),
-            "V": b.sequence.connectivity().vertex_count(), "F": b.sequence.connectivity().faces().len(),
-            "space": kind.name(), "missed": motion.missed,
-        });
-        let stored = Stored {
-            representation,
-            positions: motion.positions,
-            connectivity: b.sequence.connectivity().clone(),
-            space: kind,
-            reference: if kind == SpaceKind::Vertex {
-                Vec::new()
-            } else {
-                target.clone()
-            },
-            patches: b.patches,
-        };
+        stored.as_ref().map_or(Ok(()), |s| self.check_kept(s))?;
+        let (a, b) = self.pairs(stored.as_ref())?;
+        let motion = self.motion(stored.as_ref(), &a, knots.unwrap_or_default())?;
+        let (moved, numbers) = moved(motion, &b)?;
         let numbers = self
             .outputs
-            .write(&stored, b.sequence.positions(), numbers)?;
+            .write(&moved, b.sequence.positions(), numbers)?;
         say(&format!(
             "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces newly inside out{}",
             self.outputs.out.display(),
             numbers["n"],
             numbers["V"],
-            kind.name(),
-            stored.representation.basis.ncols() + 1,
-            100.0 * motion.missed,
+            moved.space.name(),
+            moved.representation.basis.ncols() + 1,
+            100.0 * numbers["missed"].as_f64().unwrap_or(f64::NAN),
             numbers["faces_turned"],
-            super::result::advice(&numbers, kind),
+            super::result::advice(&numbers, moved.space),
         ));
         Ok(true)
     }
 
-    fn space_of(
-        &self,
-        stored: Option<&Stored>,
-        asked: Option<SpaceKind>,
-    ) -> Result<SpaceKind, Failure> {
-        match (stored, asked) {
-            (Some(stored), Some(asked)) if stored.space != asked => Err(format!(
+    fn reads(&self) -> Places {
+        let reads = Places::default().reads_sequence("<SOURCE>", &self.source);
+        let examples = self.examples.iter().map(|name| ("--examples", name));
+        let rest = self.rest.iter().flatten().map(|name| ("--rest", name));
+        let named = examples.chain(rest);
+        named.fold(reads, |reads, (name, path)| {
+            reads.reads_sequence(name, path)
+        })
+    }
+
+    /// An error where options ask for a change of signals that stay as they are.
+    fn check_kept(&self, stored: &Stored) -> Result<(), Failure> {
+        let asked: Option<SpaceKind> = self.space.as_deref().map(str::parse).transpose()?;
+        if let Some(asked) = asked.filter(|asked| *asked != stored.space) {
+            return Err(format!(
                 "--space {}: {} is in {} space; fit it in the other space first, or leave --space out",
                 asked.name(),
                 self.source,
                 stored.space.name()
             )
-            .into()),
-            (Some(_), _) if self.k.or(self.l).is_some() => Err(format!(
+            .into());
+        }
+        if self.k.or(self.l).is_some() {
+            return Err(format!(
                 "--k and --l: the signals of {} stay as they are; constants are for sequences",
                 self.source
             )
-            .into()),
-            (Some(_), _) if !self.frames.is_all() => Err(format!(
+            .into());
+        }
+        if let Some(rule) = &self.knots {
+            return Err(format!(
+                "--knots {rule}: the time signal of {} keeps its knots; leave --knots out, or give a sequence",
+                self.source
+            )
+            .into());
+        }
+        if !self.frames.is_all() {
+            return Err(format!(
                 "--frames and --every: {} is transferred whole; edit or sample it first, or give a sequence",
                 self.source
             )
-            .into()),
-            (Some(stored), _) => Ok(stored.space),
-            (None, asked) => Ok(asked.unwrap_or(SpaceKind::Vertex)),
+            .into());
+        }
+        Ok(())
+    }
+
+    /// The examples of both sides, in the space of the representation where there is one, over its reference and patches.
+    fn pairs(&self, stored: Option<&Stored>) -> Result<(Examples, Examples), Failure> {
+        let kind = match (stored, &self.space) {
+            (Some(stored), _) => stored.space,
+            (None, Some(name)) => name.parse()?,
+            (None, None) => SpaceKind::Vertex,
+        };
+        let (a, b) = (self.examples(0)?, self.examples(1)?);
+        let [name_a, name_b] = [0, 1].map(|side| &self.examples[side]);
+        if a.frame_count() != b.frame_count() {
+            return Err(format!(
+                "--examples: {} of {name_a} but {} of {name_b}; they pair frame by frame, so give as many of each",
+                a.frame_count(),
+                b.frame_count(),
+            )
+            .into());
+        }
+        let space = stored.map(|s| (s.reference.clone(), s.patches.clone()));
+        let a = encoded(a, kind, space).map_err(|e| format!("--examples {name_a}: {e}"))?;
+        let b = encoded(b, kind, None).map_err(|e| format!("--examples {name_b}: {e}"))?;
+        Ok((a, b))
+    }
+
+    /// The motion over the examples of its own mesh.
+    fn motion(
+        &self,
+        stored: Option<&Stored>,
+        a: &Examples,
+        knots: KnotRule,
+    ) -> Result<Motion, Failure> {
+        let basis = ExampleBasis::new(a.z.as_ref());
+        let basis = basis.map_err(|e| format!("--examples {}: {e}", self.examples[0]))?;
+        match stored {
+            Some(stored) => self.kept(stored, a, &basis),
+            None => self.fitted(a, &basis, knots),
         }
     }
 
@@ -209,13 +224,12 @@ impl TransferVerb {
         )?)
     }
 
-    fn kept(&self, stored: &Stored, a: &Examples) -> Result<Motion, Failure> {
+    fn kept(&self, stored: &Stored, a: &Examples, basis: &ExampleBasis) -> Result<Motion, Failure> {
         if stored.connectivity != *a.sequence.connectivity() {
             return Err(self.other_mesh());
         }
         let n = stored.representation.time.frame_count();
         let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-        let basis = ExampleBasis::new(a.z.as_ref())?;
         let z = stored.representation.evaluate(&times);
         let z = MatRef::from_column_major_slice(&z, stored.representation.dimension(), n);
         Ok(Motion {
@@ -226,17 +240,22 @@ impl TransferVerb {
         })
     }
 
-    fn fitted(&self, a: &Examples, knots: KnotRule) -> Result<Motion, Failure> {
+    fn fitted(
+        &self,
+        a: &Examples,
+        basis: &ExampleBasis,
+        knots: KnotRule,
+    ) -> Result<Motion, Failure> {
         let sequence = self.frames.open(&self.source)?;
         if sequence.connectivity() != a.sequence.connectivity() {
             return Err(self.other_mesh());
         }
         let n = sequence.frame_count();
-        let basis = ExampleBasis::new(a.z.as_ref())?;
         let rest = a.sequence.frame(0);
-        let z = encode_motion(&*a.space, rest, &basis, sequence.positions())?;
+        let of_source = |e| format!("{}: {e}", self.source);
+        let z = encode_motion(&*a.space, rest, basis, sequence.positions()).map_err(of_source)?;
         let (k, l) = (self.k.unwrap_or(n + 2), self.l.unwrap_or(n));
-        let fit = basis.fit(z.as_ref(), k, l, knots, &[])?;
+        let fit = basis.fit(z.as_ref(), k, l, knots, &[]).map_err(of_source)?;
         Ok(Motion {
             over_examples: fit.representation,
             positions: fit.positions,
@@ -252,6 +271,31 @@ impl TransferVerb {
         )
         .into()
     }
+}
+
+/// The motion with the target's examples in place of the source's, and what `--json` holds of it.
+fn moved(motion: Motion, b: &Examples) -> Result<(Stored, Value), Failure> {
+    let mesh = b.sequence.connectivity();
+    let kind = b.space.kind();
+    let representation = replace_shape(motion.over_examples, b.z.as_ref())?;
+    let numbers = json!({
+        "n": representation.time.frame_count(), "m": representation.basis.ncols(), "rank": motion.rank,
+        "k": representation.time.spline.control.len(), "l": representation.pose.site_count(),
+        "V": mesh.vertex_count(), "F": mesh.faces().len(),
+        "space": kind.name(), "missed": motion.missed,
+    });
+    let stored = Stored {
+        representation,
+        positions: motion.positions,
+        connectivity: mesh.clone(),
+        space: kind,
+        reference: match kind {
+            SpaceKind::Vertex => Vec::new(),
+            _ => b.sequence.frame(0).to_vec(),
+        },
+        patches: b.patches.clone(),
+    };
+    Ok((stored, numbers))
 }
 
 /// Over the reference and patches given, or over the first of the examples.

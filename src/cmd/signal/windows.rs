@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::super::output::{draft_json, say};
+use super::super::output::{draft_json, progress, say};
 use super::super::{Failure, Outcome};
-use super::{Allowed, FitVerb, Fitted, How, astray, ratio, refine_numbers};
+use super::{Allowed, FitVerb, Fitted, How, astray, ratio, refine_numbers, stage_times};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
 use crate::signal::file::Stored;
@@ -37,6 +37,7 @@ pub fn run(verb: &FitVerb, window: usize, how: How) -> Outcome {
     let mut writer = writer.transpose()?;
     let mut first = None;
     let mut told = Vec::new();
+    let bar = progress(plan.windows().len());
     let mut fit_window = |frames: &Sequence, j: usize| -> Result<Stored, Failure> {
         if first.is_none() {
             first = Some(First {
@@ -57,17 +58,20 @@ pub fn run(verb: &FitVerb, window: usize, how: How) -> Outcome {
     };
     let named = |frames: &Sequence, j: usize| -> Result<Stored, Failure> {
         let (from, to) = (plan.windows()[j].start + 1, plan.windows()[j].end);
-        fit_window(frames, j)
-            .map_err(|e| format!("window {}, frames {from} to {to}: {e}", j + 1).into())
+        let place = format!("{}: window {}, frames {from} to {to}", verb.sequence, j + 1);
+        let fitted = fit_window(frames, j).map_err(|e| format!("{place}: {e}"))?;
+        bar.inc(1);
+        Ok(fitted)
     };
     let keep = |stored: &Stored| -> Result<(), Failure> {
         Ok(writer.as_mut().map_or(Ok(()), |w| w.add(stored))?)
     };
     let joined = fit_windows::<Failure>(&mut stream, &plan, named, keep)?;
+    bar.finish_and_clear();
     let size = first.map_or(f64::NAN, |first| first.size);
     let mut numbers = numbers(&plan, &joined, mesh.vertex_count(), size, how, told);
     numbers["F"] = mesh.faces().len().into();
-    numbers["time_ms"] = (start.elapsed().as_secs_f64() * 1e3).into();
+    numbers["elapsed_ms"] = (start.elapsed().as_secs_f64() * 1e3).into();
     // Whatever can fail comes before the first file gets its name.
     let json = verb.json.as_ref().map(|path| draft_json(path, &numbers));
     let json = json.transpose()?;
@@ -85,15 +89,16 @@ fn window_numbers(plan: &Plan, window: usize, fitted: &Fitted, size: f64) -> Val
     let (k, l, m) = fit.klm();
     let range = &plan.windows()[window];
     let mut numbers = json!({
-        "first": range.start + 1, "last": range.end, "k": k, "l": l, "m": m,
+        "first": range.start + 1, "last": range.end, "d": fit.representation.dimension(), "k": k, "l": l, "m": m,
         "layout_weight": fit.layout_weight,
         "error_h": fit.errors.h, "error_g": fit.errors.g, "error_f": fit.errors.f, "error_psi": fit.errors.psi,
         "rms_relative": ratio(fitted.found.rms, size),
         "stored_numbers": fit.representation.stored_numbers(),
         "astray": astray(fit, range.start),
+        "time_ms": stage_times(fit),
     });
-    if let Some(told) = &fitted.refinement {
-        numbers["refine"] = refine_numbers(told);
+    if let Some(refined) = &fitted.refined {
+        numbers["refine"] = refine_numbers(refined, size);
     }
     numbers
 }
@@ -110,7 +115,7 @@ fn numbers(
     let n = plan.frame_count();
     let rms = (joined.error / (n * vertices) as f64).sqrt();
     let stored = windows.iter().filter_map(|w| w["stored_numbers"].as_u64());
-    json!({
+    let mut numbers = json!({
         "n": n, "V": vertices, "space": how.space.name(),
         "knots": how.knots.to_string(), "layout": how.layout.to_string(),
         "overlap": plan.overlap(),
@@ -118,7 +123,14 @@ fn numbers(
         "kg_percent": 100.0 * ratio(joined.error.sqrt(), joined.spread.sqrt()),
         "stored_numbers": stored.sum::<u64>(),
         "windows": windows,
-    })
+    });
+    // In patch space each window has patches, and so a dimension, of its own.
+    let windows = numbers["windows"].as_array().map_or(&[][..], Vec::as_slice);
+    let d = windows.first().map(|w| w["d"].clone());
+    if let Some(d) = d.filter(|d| windows.iter().all(|w| w["d"] == *d)) {
+        numbers["d"] = d;
+    }
+    numbers
 }
 
 fn describe(name: &str, v: &Value) -> String {
@@ -143,7 +155,7 @@ fn describe(name: &str, v: &Value) -> String {
         v["stored_numbers"],
         3 * v["n"].as_u64().unwrap_or(0) * v["V"].as_u64().unwrap_or(0),
         astray.sum::<usize>(),
-        number(v, "time_ms"),
+        number(v, "elapsed_ms"),
     );
     for w in windows {
         text += &format!(

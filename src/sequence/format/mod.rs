@@ -64,6 +64,25 @@ pub fn stream(path: &Path) -> Result<FrameStream, FormatError> {
     obj::stream(path, frame_files(path)?)
 }
 
+/// The files that [`read`] reads for `path`. Reads names only, no contents.
+pub fn source_files(path: &Path) -> Result<Vec<PathBuf>, FormatError> {
+    if !path.is_dir() {
+        if has_extension(path, "npz") {
+            return Ok(vec![path.into()]);
+        }
+        if has_extension(path, "pc2") {
+            return Ok(vec![path.into(), pc2::companion(path)?]);
+        }
+    }
+    frame_files(path)
+}
+
+/// The file or folder that [`write`] makes of `path`, and the mesh beside it where there is one.
+pub fn written_files(path: &Path) -> Vec<PathBuf> {
+    let beside = has_extension(path, "pc2").then(|| path.with_extension("obj"));
+    [path.into()].into_iter().chain(beside).collect()
+}
+
 /// Reads OBJ files as the frames of one sequence, in this order.
 pub fn read_files(paths: &[PathBuf]) -> Result<Sequence, FormatError> {
     obj::read(paths)

@@ -120,7 +120,8 @@ fn parse_header(path: &Path, header: &[u8; HEADER]) -> Result<(usize, usize), Fo
     Ok((frames as usize, vertices as usize))
 }
 
-fn companion(path: &Path) -> Result<PathBuf, FormatError> {
+/// The OBJ with the faces: of the same stem, or else the only one of the folder.
+pub(super) fn companion(path: &Path) -> Result<PathBuf, FormatError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let found = match frame_files(folder.unwrap_or(Path::new("."))) {
         Err(FormatError::NoFrames { .. }) => Vec::new(),
