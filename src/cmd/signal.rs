@@ -22,7 +22,7 @@ use super::places::Places;
 use super::{Failure, FrameChoice, Outcome, whole};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
-use crate::shape::{Space, SpaceKind, patches_for, prepare};
+use crate::shape::{Convergence, Space, SpaceKind, patches_for, prepare};
 use crate::signal::fidelity::fit_to_error;
 use crate::signal::file::{Stored, save};
 use crate::signal::fit::{Fit, FitError, FitOptions, fit};
@@ -391,7 +391,13 @@ impl FitVerb {
                 }
             };
             let rms = rms_of(&fit);
-            return Ok((SpaceFit { fit, rms }, told));
+            let convergence = Convergence::default();
+            let found = SpaceFit {
+                fit,
+                rms,
+                convergence,
+            };
+            return Ok((found, told));
         };
         let rms = allowed.rms(tolerance, n);
         Ok(match (&constants, &refine) {
@@ -464,6 +470,15 @@ fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value 
         "astray": astray(fit, 0),
         "time_ms": stage_times(fit),
     });
+    let Convergence {
+        frames,
+        unsettled,
+        imbalance,
+    } = found.convergence;
+    if frames > 0 {
+        numbers["descent"] =
+            json!({"frames": frames, "unsettled": unsettled, "imbalance": imbalance});
+    }
     match &fitted.refined {
         Some(refined) => numbers["refine"] = refine_numbers(refined, size),
         // Refinement moves sites off the frames; `signal info --json` tells where they are.
@@ -517,12 +532,20 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
             number("time_ms")
         )
     });
+    let descent = v.get("descent").map_or(String::new(), |d| {
+        let imbalance = d["imbalance"].as_f64().unwrap_or(f64::NAN);
+        format!(
+            "\ndecoded by descent: {} of {} frames come to a stationary one, the worst is off by a cosine of {imbalance:.1e}",
+            d["frames"].as_u64().unwrap_or(0) - d["unsettled"].as_u64().unwrap_or(0),
+            d["frames"],
+        )
+    });
     format!(
         "{name}: {} space, n = {}, k = {}, l = {}, m = {}, {} knots, {} layout (weight {})\n\
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          {}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers in h, g and f for {} given\n\
-         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}{descent}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],

@@ -73,7 +73,7 @@ impl<'a> Frames<'a> {
     fn errors(&self, fit: &Fit) -> Result<Vec<f64>, StageError> {
         let positions = self.sequence.positions();
         let squares = mean_squares(&*self.space, positions, &fit.representation);
-        let squares = squares.map_err(StageError::from_error)?;
+        let (squares, _) = squares.map_err(StageError::from_error)?;
         Ok(squares.iter().map(|s| s.sqrt() / self.diagonal).collect())
     }
 
@@ -88,7 +88,8 @@ impl<'a> Frames<'a> {
             let fit = with(value).fit(self.z.as_ref())?;
             let positions = self.sequence.positions();
             let rms = rms_after_decoding(&*self.space, positions, &fit.representation);
-            Ok((value, rms.map_err(StageError::from_error)? / self.diagonal))
+            let (rms, _) = rms.map_err(StageError::from_error)?;
+            Ok((value, rms / self.diagonal))
         };
         steps(low, high).into_iter().map(error).collect()
     }

@@ -199,6 +199,14 @@ impl Space for LengthsSpace {
         self.descend(z, positions).map(|_| ())
     }
 
+    fn decode_telling(
+        &self,
+        z: &[f64],
+        positions: &mut [f64],
+    ) -> Result<Option<Descent>, ShapeError> {
+        self.descend(z, positions).map(Some)
+    }
+
     fn unwrap(&self, previous: &[f64], z: &mut [f64]) {
         if previous.len() == self.dimension() && z.len() == self.dimension() {
             self.layout.unwrap(previous, z);

@@ -43,6 +43,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use self::partition::PatchError;
+use self::shell::Descent;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
@@ -154,6 +155,15 @@ pub trait Space: Send + Sync {
     /// also a factorisation in [`lric`] (3F unknowns) and [`patch`] (3 a patch), and in [`lengths`] one for each step of a descent.
     fn decode(&self, z: &[f64], positions: &mut [f64]) -> Result<(), ShapeError>;
 
+    /// [`Self::decode`], and how it ended where it is a descent, as in [`lengths`].
+    fn decode_telling(
+        &self,
+        z: &[f64],
+        positions: &mut [f64],
+    ) -> Result<Option<Descent>, ShapeError> {
+        self.decode(z, positions).map(|()| None)
+    }
+
     /// Chooses the branches of the angles in `z` nearest to those in `previous`, such as the frame before. Nothing where there are no angles.
     fn unwrap(&self, _previous: &[f64], _z: &mut [f64]) {}
 
@@ -252,8 +262,37 @@ fn encode_each(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError
     Ok(z)
 }
 
+/// How decoded frames ended where decoding is a descent; all 0 where it is not.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Convergence {
+    /// How many frames were descended to.
+    pub frames: usize,
+    /// How many of them are no stationary frame, see [`Descent::is_stationary`].
+    pub unsettled: usize,
+    /// The greatest [`Descent::imbalance`].
+    pub imbalance: f64,
+}
+
+impl Convergence {
+    fn of(descents: impl Iterator<Item = Descent>) -> Self {
+        descents.fold(Self::default(), |all, descent| Self {
+            frames: all.frames + 1,
+            unsettled: all.unsettled + usize::from(!descent.is_stationary()),
+            imbalance: all.imbalance.max(descent.imbalance),
+        })
+    }
+}
+
 /// The frames (n x 3V positions) of the columns of a d x n matrix, in parallel.
 pub fn decode_all(space: &dyn Space, z: MatRef<'_, f64>) -> Result<Vec<f64>, ShapeError> {
+    Ok(decode_all_telling(space, z)?.0)
+}
+
+/// [`decode_all`], and how it converged.
+pub fn decode_all_telling(
+    space: &dyn Space,
+    z: MatRef<'_, f64>,
+) -> Result<(Vec<f64>, Convergence), ShapeError> {
     let len = space.frame_len();
     let mut frames = vec![0.0; len * z.ncols()];
     let outcomes = frames
@@ -262,13 +301,13 @@ pub fn decode_all(space: &dyn Space, z: MatRef<'_, f64>) -> Result<Vec<f64>, Sha
         .map(|(i, frame)| {
             let column = z.col(i);
             let decoded = match column.try_as_col_major() {
-                Some(column) => space.decode(column.as_slice(), frame),
-                None => space.decode(&column.iter().copied().collect::<Vec<_>>(), frame),
+                Some(column) => space.decode_telling(column.as_slice(), frame),
+                None => space.decode_telling(&column.iter().copied().collect::<Vec<_>>(), frame),
             };
             decoded.map_err(|e| e.of_frame(i))
         });
-    first_error(outcomes)?;
-    Ok(frames)
+    let descents = first_error(outcomes)?.into_iter().flatten();
+    Ok((frames, Convergence::of(descents)))
 }
 
 impl ShapeError {
@@ -282,8 +321,8 @@ impl ShapeError {
 }
 
 /// The error of the lowest index, so that it does not depend on which thread is the fastest.
-fn first_error(
-    outcomes: impl IndexedParallelIterator<Item = Result<(), ShapeError>>,
-) -> Result<(), ShapeError> {
+fn first_error<T: Send>(
+    outcomes: impl IndexedParallelIterator<Item = Result<T, ShapeError>>,
+) -> Result<Vec<T>, ShapeError> {
     outcomes.collect::<Vec<_>>().into_iter().collect()
 }

@@ -1,13 +1,13 @@
 //! The pose signal g: a thin-plate approximation from the pose plane to shape coordinates (sections 2.2 and 3.2).
 
-use faer::{Accum, Mat, MatRef};
+use faer::{Accum, Mat, MatRef, unzip, zip};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::Point;
 use super::thin_plate::{Frame, kernels};
 use crate::linalg::dense::{Cholesky, Qr, multiply};
-use crate::linalg::kernels::{axpy, combine_fused};
+use crate::linalg::kernels::{axpy, combine_fused, dot};
 use crate::linalg::panels::{self, Panels};
 
 /// Sites closer than this share of their extent coincide.
@@ -277,7 +277,14 @@ pub(super) fn in_given_units(
 ) -> Mat<f64> {
     let (l, m) = weights.shape();
     let s = frame.size;
+    let squares: Vec<f64> = normalised
+        .iter()
+        .map(|p| p[0] * p[0] + p[1] * p[1])
+        .collect();
     let mut out = Mat::zeros(m, l + 3);
+    let per_area = 1.0 / (s * s);
+    zip!(out.get_mut(.., 1..l + 1), weights.transpose())
+        .for_each(|unzip!(out, weight)| *out = weight * per_area);
     for a in 0..m {
         let along = |axis: usize| {
             if axis + 1 < frame.affine {
@@ -287,13 +294,8 @@ pub(super) fn in_given_units(
             }
         };
         let gradient = frame.axes * nalgebra::Vector2::new(along(0), along(1)) / s;
-        let spread: f64 = (0..l)
-            .map(|j| weights[(j, a)] * (normalised[j][0].powi(2) + normalised[j][1].powi(2)))
-            .sum();
+        let spread = dot(weights.col_as_slice(a), &squares);
         out[(a, 0)] = affine[(0, a)] - gradient.dot(&frame.centre) - spread * s.ln();
-        for j in 0..l {
-            out[(a, j + 1)] = weights[(j, a)] / (s * s);
-        }
         out[(a, l + 1)] = gradient[0];
         out[(a, l + 2)] = gradient[1];
     }

@@ -12,7 +12,7 @@ use super::pins::Pin;
 use super::psi::Representation;
 use super::refine::tolerance::choose_refined;
 use super::refine::{RefineOptions, Refinement, refine};
-use crate::shape::{ShapeError, Space, decode_all, encode_all};
+use crate::shape::{Convergence, ShapeError, Space, decode_all, decode_all_telling, encode_all};
 
 /// Fits tried until the vertices are near enough.
 const ATTEMPTS: usize = 12;
@@ -27,6 +27,19 @@ pub struct SpaceFit {
     pub fit: Fit,
     /// Root mean square distance of the vertices of psi(i), decoded, from those of frame i.
     pub rms: f64,
+    /// How the decoding of psi(i) converged.
+    pub convergence: Convergence,
+}
+
+impl SpaceFit {
+    fn measured(space: &dyn Space, frames: &[f64], fit: Fit) -> Result<Self, ShapeError> {
+        let (rms, convergence) = rms_after_decoding(space, frames, &fit.representation)?;
+        Ok(Self {
+            fit,
+            rms,
+            convergence,
+        })
+    }
 }
 
 /// Why there is no fit in a shape space.
@@ -48,8 +61,7 @@ pub fn fit_in_space(
 ) -> Result<SpaceFit, SpaceFitError> {
     let z = encode_all(space, frames)?;
     let fit = fit(z.as_ref(), options)?;
-    let rms = rms_after_decoding(space, frames, &fit.representation)?;
-    Ok(SpaceFit { fit, rms })
+    Ok(SpaceFit::measured(space, frames, fit)?)
 }
 
 /// Refines a fit to these frames. (2) in S does not rise; what that makes of the vertices is measured.
@@ -61,8 +73,7 @@ pub fn refine_in_space(
 ) -> Result<(SpaceFit, Refinement), SpaceFitError> {
     let z = encode_all(space, frames)?;
     let (fit, refinement) = refine(z.as_ref(), found.fit, options)?;
-    let rms = rms_after_decoding(space, frames, &fit.representation)?;
-    Ok((SpaceFit { fit, rms }, refinement))
+    Ok((SpaceFit::measured(space, frames, fit)?, refinement))
 }
 
 /// Chooses k, l and m (section 3.4) so that the vertices are off by at most `rms` after decoding.
@@ -141,20 +152,21 @@ fn to_rms<T>(
     let (mut met, mut missed) = (0.0, f64::INFINITY);
     for _ in 0..ATTEMPTS {
         let (fit, told) = to_error(&whole, most.max(f64::MIN_POSITIVE))?;
-        let found = rms_after_decoding(space, frames, &fit.representation)?;
-        let estimate = AIM * most * (rms / found.max(f64::MIN_POSITIVE)).powi(2);
-        if found > rms {
+        let found = SpaceFit::measured(space, frames, fit)?;
+        let off = found.rms;
+        let estimate = AIM * most * (rms / off.max(f64::MIN_POSITIVE)).powi(2);
+        if off > rms {
             missed = most;
         } else {
             met = most;
             let numbers = |fit: &Fit| fit.representation.stored_numbers();
             if best
                 .as_ref()
-                .is_none_or(|(b, _)| numbers(&fit) < numbers(&b.fit))
+                .is_none_or(|(b, _)| numbers(&found.fit) < numbers(&b.fit))
             {
-                best = Some((SpaceFit { fit, rms: found }, told));
+                best = Some((found, told));
             }
-            if found >= CLOSE * rms {
+            if off >= CLOSE * rms {
                 break;
             }
         }
@@ -170,8 +182,7 @@ fn to_rms<T>(
         return Ok(best);
     }
     let (fit, told) = last_resort(z.as_ref())?;
-    let rms = rms_after_decoding(space, frames, &fit.representation)?;
-    Ok((SpaceFit { fit, rms }, told))
+    Ok((SpaceFit::measured(space, frames, fit)?, told))
 }
 
 /// psi at many times as frames of 3V positions, decoded.
@@ -185,32 +196,35 @@ pub fn sample_in_space(
     decode_all(space, MatRef::from_column_major_slice(&z, d, times.len()))
 }
 
-/// The mean square distance of the vertices of psi(i), decoded, from those of frame i, of each of the n frames.
+/// The mean square distance of the vertices of psi(i), decoded, from those of frame i, of each of the n frames; and how decoding converged.
 pub fn mean_squares(
     space: &dyn Space,
     frames: &[f64],
     representation: &Representation,
-) -> Result<Vec<f64>, ShapeError> {
+) -> Result<(Vec<f64>, Convergence), ShapeError> {
     let n = representation.time.frame_count();
     let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let decoded = sample_in_space(space, representation, &times)?;
+    let z = representation.evaluate(&times);
+    let z = MatRef::from_column_major_slice(&z, representation.dimension(), n);
+    let (decoded, convergence) = decode_all_telling(space, z)?;
     let len = space.frame_len();
     let of_frame = |(a, b): (&[f64], &[f64])| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
         squares.sum::<f64>() / (len as f64 / 3.0)
     };
     let pairs = decoded.chunks(len).zip(frames.chunks(len));
-    Ok(pairs.map(of_frame).collect())
+    Ok((pairs.map(of_frame).collect(), convergence))
 }
 
-/// The root mean square distance of the vertices of all frames.
+/// The root mean square distance of the vertices of all frames; and how decoding converged.
 pub fn rms_after_decoding(
     space: &dyn Space,
     frames: &[f64],
     representation: &Representation,
-) -> Result<f64, ShapeError> {
-    let each = mean_squares(space, frames, representation)?;
-    Ok((each.iter().sum::<f64>() / each.len() as f64).sqrt())
+) -> Result<(f64, Convergence), ShapeError> {
+    let (each, convergence) = mean_squares(space, frames, representation)?;
+    let mean = each.iter().sum::<f64>() / each.len() as f64;
+    Ok((mean.sqrt(), convergence))
 }
 
 /// Sum of squared distances of the columns from their mean.
