@@ -37,7 +37,8 @@ impl Report {
             std::path::absolute(&path)?.display()
         ));
         if let Some(readme) = self.splice {
-            let text = std::fs::read_to_string(&readme)?;
+            let text = std::fs::read_to_string(&readme)
+                .map_err(|e| format!("--splice {}: {e}", readme.display()))?;
             let text = report::splice(&text, "results", &report::readme_table(&record))?;
             write_whole(&readme, &text)?;
             if let Some(picture) = report::readme_picture(&record) {

@@ -72,6 +72,15 @@ impl Verify {
             None => None,
         };
         let cases = select(read_all(&home().join("bench/cases"))?, &self.run.cases)?;
+        if let Some(fault) = fault
+            && !cases.iter().any(|case| case.stage == fault.stage)
+        {
+            return Err(format!(
+                "--inject {}: its stage {} is not among the {} cases chosen; name cases that have it",
+                fault.name, fault.stage, cases.len()
+            )
+            .into());
+        }
         let timing = if self.time {
             Timing::Marked
         } else {
@@ -88,7 +97,11 @@ impl Verify {
             .agreement
             .iter()
             .any(|row| row.verdict == Verdict::Missing);
-        Ok(wrong.count() == 0 && failed == 0 && !(self.require_oracles && missing))
+        if record.agreement.is_empty() {
+            say("nothing was verified");
+        }
+        let some = !record.agreement.is_empty();
+        Ok(some && wrong.count() == 0 && failed == 0 && !(self.require_oracles && missing))
     }
 }
 

@@ -11,6 +11,7 @@ mod transfer;
 mod windows;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use faer::MatRef;
@@ -235,7 +236,11 @@ impl FitVerb {
         let reference = self.reference(&sequence, how.space)?;
         let fitted = self.fit(&sequence, &reference, how, pins, Allowed::of(&sequence));
         let fitted = fitted.map_err(|e| format!("{}: {e}", self.sequence))?;
-        let numbers = numbers(&sequence, &fitted, how);
+        let mut numbers = numbers(&sequence, &fitted, how);
+        let missed = self.tolerance.map(|r| missed(&numbers, r));
+        if let Some(missed) = missed {
+            numbers["tolerance_met"] = (!missed).into();
+        }
         // Whatever can fail comes before the first file gets its name.
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));
         let json = json.transpose()?;
@@ -249,7 +254,11 @@ impl FitVerb {
         if let Some(note) = self.cut(&numbers) {
             say(&note);
         }
-        Ok(true)
+        let missed = missed.unwrap_or(false);
+        if missed {
+            say(MISSED);
+        }
+        Ok(!missed)
     }
 
     fn check_places(&self) -> Result<(), Failure> {
@@ -391,11 +400,11 @@ impl FitVerb {
                 }
             };
             let rms = rms_of(&fit);
-            let convergence = Convergence::default();
             let found = SpaceFit {
                 fit,
                 rms,
-                convergence,
+                convergence: Convergence::default(),
+                decoding: Duration::ZERO,
             };
             return Ok((found, told));
         };
@@ -470,6 +479,9 @@ fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value 
         "astray": astray(fit, 0),
         "time_ms": stage_times(fit),
     });
+    if how.space != SpaceKind::Vertex {
+        numbers["time_ms"]["decode"] = milliseconds(found.decoding).into();
+    }
     let Convergence {
         frames,
         unsettled,
@@ -492,9 +504,12 @@ fn numbers(sequence: &Sequence, fitted: &Fitted, how: How) -> serde_json::Value 
 
 /// Milliseconds of each stage.
 fn stage_times(fit: &Fit) -> serde_json::Value {
-    let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
-    let t = fit.timings;
+    let (ms, t) = (milliseconds, fit.timings);
     json!({"h": ms(t.h), "mds": ms(t.mds), "rbf": ms(t.rbf), "g": ms(t.g), "f": ms(t.f)})
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
 }
 
 /// The in-betweens that go astray, in frame times of the sequence in which `before` frames come before those of the fit.
@@ -504,6 +519,17 @@ fn astray(fit: &Fit, before: usize) -> Vec<serde_json::Value> {
     places
         .map(|p| json!({"time": time(&p), "stray": p.stray, "curvature": p.curvature}))
         .collect()
+}
+
+/// Rounding of a relative error, as a share of it and as such.
+const ROUNDING: [f64; 2] = [1e-6, 1e-12];
+const MISSED: &str = "the tolerance is not met: this is as near as signals through every frame come. Pins that hold frames in one place keep them from it, \
+                      and so do frames that do not come back from the shape space";
+
+/// Whether a fit is farther off than was allowed.
+fn missed(numbers: &serde_json::Value, tolerance: f64) -> bool {
+    let found = numbers["rms_relative"].as_f64().unwrap_or(f64::NAN);
+    found.is_nan() || found > tolerance * (1.0 + ROUNDING[0]) + ROUNDING[1]
 }
 
 /// Nothing is nothing of anything, also of nothing.
@@ -532,6 +558,10 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
             number("time_ms")
         )
     });
+    let decode = v["time_ms"]
+        .get("decode")
+        .and_then(serde_json::Value::as_f64);
+    let decode = decode.map_or(String::new(), |ms| format!(", decoding all frames {ms:.3}"));
     let descent = v.get("descent").map_or(String::new(), |d| {
         let imbalance = d["imbalance"].as_f64().unwrap_or(f64::NAN);
         format!(
@@ -545,7 +575,7 @@ fn describe(name: &str, v: &serde_json::Value) -> String {
          errors: (3) {:.5}, (4) {:.5}, (7) {:.5}, (2) {:.5}\n\
          {}\n\
          relative RMS {:.4}%, Karni-Gotsman {:.4}%, {} numbers in h, g and f for {} given\n\
-         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{refined}{descent}",
+         ms: h {:.3}, mds {:.3} ({} majorising steps, {} of Newton), rbf {:.3}, g {:.3}, f {:.3}{decode}{refined}{descent}",
         v["space"].as_str().unwrap_or(""),
         v["n"],
         v["k"],

@@ -213,6 +213,9 @@ pub enum RecordError {
     /// A table whose rows are not as expected.
     #[error("{path}: {source}")]
     Table { path: PathBuf, source: csv::Error },
+    /// Something else than a table.
+    #[error("{path}: expected a table, found text without a row; was it cut off?")]
+    NoRows { path: PathBuf },
     /// Figures that are not as expected.
     #[error("{path}: {source}")]
     Json {
@@ -312,11 +315,16 @@ fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), RecordError>
 fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, RecordError> {
     let text = read_text(path)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
-    reader
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|source| RecordError::Table {
+    let rows = reader.deserialize().collect::<Result<Vec<T>, _>>();
+    let rows = rows.map_err(|source| RecordError::Table {
+        path: path.to_owned(),
+        source,
+    })?;
+    // A table without rows is written as nothing at all.
+    match rows.is_empty() && !text.trim().is_empty() {
+        true => Err(RecordError::NoRows {
             path: path.to_owned(),
-            source,
-        })
+        }),
+        false => Ok(rows),
+    }
 }

@@ -89,12 +89,22 @@ pub fn area(positions: &[f64], faces: &[[u32; 3]]) -> f64 {
 
 /// The signed volume, the sum of det[a b c] / 6, in cubed units: positive when closed and seen counter-clockwise from
 /// outside. On an open mesh it is the volume of the cone over it with its tip in the origin.
+///
+/// Summed about a corner of the mesh, and then about the origin by what its boundary leaves of the sum of area vectors: far from the origin, which may be
+/// a thousand diagonals away, nothing cancels.
 pub fn volume(positions: &[f64], faces: &[[u32; 3]]) -> f64 {
-    let six_fold = |face: &[u32; 3]| {
-        let [a, b, c] = corners(positions, face);
-        dot(a, cross(b, c))
+    let Some(&[first, ..]) = faces.first() else {
+        return 0.0;
     };
-    faces.iter().map(six_fold).sum::<f64>() / 6.0
+    let tip = point(positions, first);
+    let (mut six_fold, mut twice_area) = (0.0, [0.0; 3]);
+    for face in faces {
+        let [a, b, c] = corners(positions, face).map(|p| sub(p, tip));
+        six_fold += dot(a, cross(b, c));
+        let vector = cross(sub(b, a), sub(c, a));
+        (0..3).for_each(|i| twice_area[i] += vector[i]);
+    }
+    (six_fold + dot(tip, twice_area)) / 6.0
 }
 
 /// The smallest box around all vertices, referenced or not.
@@ -192,6 +202,16 @@ mod tests {
             }
         );
         assert_eq!(m.bounds.diagonal(), 29f64.sqrt());
+    }
+
+    #[test]
+    fn far_from_the_origin_a_closed_volume_is_the_same_and_an_open_one_a_cone() {
+        let far = |x: f64| cuboid([x, -x, x], [x + 2.0, 3.0 - x, x + 4.0]);
+        assert!((volume(&far(1e6), &CUBE) - 24.0).abs() < 1e-6);
+        // A face of the box at x = 5 has the area 12: the cone over it is 5 . 12 / 3.
+        let side = [CUBE[6], CUBE[7]];
+        assert!((volume(&cuboid([3.0, 0.0, 0.0], [5.0, 3.0, 4.0]), &side) - 20.0).abs() < 1e-12);
+        assert_eq!(volume(&far(1.0), &[]), 0.0);
     }
 
     #[test]

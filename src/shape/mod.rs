@@ -47,6 +47,9 @@ use self::shell::Descent;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
+/// Diagonals of the bounding box of a reference that is no point.
+pub(crate) const DIAGONALS: [f64; 2] = [1e-50, 1e50];
+
 /// Which space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SpaceKind {
@@ -120,6 +123,12 @@ pub enum ShapeError {
     /// NaN or infinite.
     #[error("{what}: number {index} (0-based) is not finite")]
     NotFinite { what: &'static str, index: usize },
+    /// Coordinates whose squares are no numbers.
+    #[error(
+        "{what}: the bounding box has a diagonal of {diagonal:e}, expected one from {:e} to {:e}, so that areas and their squares can be told; scale the frames",
+        DIAGONALS[0], DIAGONALS[1]
+    )]
+    Magnitude { what: &'static str, diagonal: f64 },
     /// See [`FactorError`].
     #[error("the equations of the space cannot be solved: {0}")]
     Factor(#[from] FactorError),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::ShapeError;
+use super::{DIAGONALS, ShapeError};
 use crate::linalg::kernels::{LANES, total, vectorised};
 use crate::mesh::Connectivity;
 use crate::mesh::measure::bounds;
@@ -92,13 +92,17 @@ impl Reference {
     /// Measures a frame of 3V positions. O(V + F).
     pub fn new(connectivity: Arc<Connectivity>, positions: &[f64]) -> Result<Self, ShapeError> {
         check("reference", positions, 3 * connectivity.vertex_count())?;
+        let diagonal = bounds(positions).diagonal();
+        if diagonal > 0.0 && !(DIAGONALS[0]..=DIAGONALS[1]).contains(&diagonal) {
+            let what = "reference";
+            return Err(ShapeError::Magnitude { what, diagonal });
+        }
         let faces = connectivity.faces();
         let triangles: Vec<_> = faces
             .iter()
             .map(|f| Triangle::new(f.map(|v| point(positions, v))))
             .collect();
         let (labels, components) = parts(&connectivity, &triangles);
-        let diagonal = bounds(positions).diagonal();
         Ok(Self {
             connectivity,
             positions: positions.to_vec(),

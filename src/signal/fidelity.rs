@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use faer::MatRef;
 
-use super::fit::{Attempt, Base, FEWEST_FRAMES, Fit, FitError, error_h, timed};
+use super::fit::{Attempt, Base, FEWEST_FRAMES, Fit, FitError, check_magnitude, error_h, timed};
 use super::h::{ShapeSignal, shape_signal};
 use super::knots::KnotRule;
 use super::layout::Layout;
@@ -62,6 +62,7 @@ pub(super) fn check(
     if most.is_nan() || most <= 0.0 {
         return Err(FitError::BadTolerance { value: most });
     }
+    check_magnitude(frames)?;
     layout.check()?;
     Ok(validate_pins(pins, n)?)
 }

@@ -96,6 +96,12 @@ pub enum FitError {
     /// See [`SplineError`].
     #[error(transparent)]
     Spline(#[from] SplineError),
+    /// Numbers whose squares are none.
+    #[error(
+        "the greatest number of the frames is {greatest:e}, expected one from {:e} to {:e}, so that squares and their sums can be told; scale the frames",
+        MAGNITUDES[0], MAGNITUDES[1]
+    )]
+    Magnitude { greatest: f64 },
     /// A tolerance that is not a positive number.
     #[error("tolerance {value}, expected a positive relative RMS such as 0.01")]
     BadTolerance { value: f64 },
@@ -186,10 +192,23 @@ pub fn fit(frames: MatRef<'_, f64>, options: &FitOptions) -> Result<Fit, FitErro
             ("m", options.m, 0, most_m),
         ],
     )?;
+    check_magnitude(frames)?;
     validate_pins(&options.pins, n)?;
     options.layout.check()?;
     let base = Base::new(frames, options.m, options.layout, &options.pins)?;
     base.fit(options.k, options.l, options.knots)
+}
+
+/// Magnitudes of the greatest number of frames that are not all 0.
+const MAGNITUDES: [f64; 2] = [1e-100, 1e100];
+
+/// An error where squares of numbers would be infinite or 0. O(d n).
+pub(super) fn check_magnitude(frames: MatRef<'_, f64>) -> Result<(), FitError> {
+    let greatest = frames.norm_max();
+    match greatest == 0.0 || (MAGNITUDES[0]..=MAGNITUDES[1]).contains(&greatest) {
+        true => Ok(()),
+        false => Err(FitError::Magnitude { greatest }),
+    }
 }
 
 /// An error unless there are enough frames and each constant, by name, lies between its least and its greatest value.

@@ -1,6 +1,8 @@
 //! Reconstruction in a shape space (section 5): signals are fitted to the vectors z of the frames, and what counts in the end is how far the
 //! vertices are off after decoding.
 
+use std::time::{Duration, Instant};
+
 use faer::{Mat, MatRef};
 use thiserror::Error;
 
@@ -29,15 +31,19 @@ pub struct SpaceFit {
     pub rms: f64,
     /// How the decoding of psi(i) converged.
     pub convergence: Convergence,
+    /// Wall time of decoding psi(i), i = 1 .. n.
+    pub decoding: Duration,
 }
 
 impl SpaceFit {
     fn measured(space: &dyn Space, frames: &[f64], fit: Fit) -> Result<Self, ShapeError> {
+        let start = Instant::now();
         let (rms, convergence) = rms_after_decoding(space, frames, &fit.representation)?;
         Ok(Self {
             fit,
             rms,
             convergence,
+            decoding: start.elapsed(),
         })
     }
 }

@@ -15,6 +15,8 @@ use crate::linalg::kernels::{axpy, dot};
 pub const ASTRAY: f64 = 0.25;
 /// Where a motion stands still or nearly so, this share of its mean step is what its in-betweens are measured by.
 const STILL: f64 = 0.1;
+/// A step of less than this share of the mean step is none.
+const HELD: f64 = 1e-9;
 /// Where the tangents of g are nearer than this to parallel (the square of a sine), the surface has no tangent plane to speak of.
 const PARALLEL: f64 = 1e-12;
 
@@ -25,7 +27,7 @@ pub struct Place {
     pub time: f64,
     /// f(time).
     pub point: Point,
-    /// Distance in shape coordinates of g(f(time)) from the cubic spline, less the greater of the errors of g(f(i)) and g(f(i + 1)), over the mean
+    /// Distance in shape coordinates of g(f(time)) from the cubic spline (from the frame where two are equal), less the greater of the errors of g(f(i)) and g(f(i + 1)), over the mean
     /// length of the steps from i - 1 to i + 2, or a tenth of all steps' mean where that is more. What a fit of few sites smooths away at the frames does not count; 0 is the least.
     pub stray: f64,
     /// Gaussian curvature of the surface g at f(time), times the square of that mean length, which leaves no unit: how much a patch the size of a
@@ -70,7 +72,14 @@ pub fn places(fit: &Fit) -> Vec<Place> {
             let point = fit.representation.time.evaluate(time);
             let beside = &steps[i.saturating_sub(1)..(i + 2).min(steps.len())];
             let step = beside.iter().sum::<f64>() / beside.len() as f64;
-            let beyond = away(time, witness.col_as_slice(i)) - errors[i].max(errors[i + 1]);
+            // Between two frames of one pose there is that pose, whatever a cubic makes of the steps around.
+            let held = steps[i] <= HELD * mean;
+            let expected = if held {
+                frames[i]
+            } else {
+                witness.col_as_slice(i)
+            };
+            let beyond = away(time, expected) - errors[i].max(errors[i + 1]);
             let scale = step.max(STILL * mean);
             Place {
                 time,

@@ -101,13 +101,12 @@ impl DesignVerb {
         };
         let numbers = self.outputs.write(&stored, &poses, numbers)?;
         say(&format!(
-            "{}: {} frames from {} poses in {} space; {} faces newly inside out{}",
+            "{}: {} frames from {} poses in {} space; {}",
             self.outputs.out.display(),
             self.frames,
             places.len(),
             kind.name(),
-            numbers["faces_turned"],
-            super::result::advice(&numbers, kind),
+            super::result::inside_out(&numbers, kind),
         ));
         Ok(true)
     }

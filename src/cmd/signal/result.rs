@@ -27,11 +27,15 @@ pub struct Outputs {
     json: Option<PathBuf>,
 }
 
-/// What helps where faces are inside out.
-pub fn advice(numbers: &Value, kind: SpaceKind) -> &'static str {
-    match numbers["faces_turned"] == 0 || kind != SpaceKind::Vertex {
-        true => "",
-        false => "; in gradient space there are often fewer",
+/// How many faces are newly inside out, and what helps.
+pub fn inside_out(numbers: &Value, kind: SpaceKind) -> String {
+    let (faces, times) = (&numbers["faces_turned_distinct"], &numbers["faces_turned"]);
+    match (times == 0, kind) {
+        (true, _) => "no face newly inside out".to_owned(),
+        (false, SpaceKind::Vertex) => format!(
+            "{faces} faces newly inside out, {times} times in all frames; in gradient space there are often fewer"
+        ),
+        (false, _) => format!("{faces} faces newly inside out, {times} times in all frames"),
     }
 }
 
@@ -63,7 +67,11 @@ impl Outputs {
         let orientation = Orientation::new(&examples[..sequence.dimension()], faces);
         let before = orientation.not_clear(examples);
         let turned = orientation.newly_turned(sequence.positions(), &before);
-        numbers["faces_turned"] = turned.iter().map(Vec::len).sum::<usize>().into();
+        let mut faces: Vec<u32> = turned.iter().flatten().copied().collect();
+        numbers["faces_turned"] = faces.len().into();
+        faces.sort_unstable();
+        faces.dedup();
+        numbers["faces_turned_distinct"] = faces.len().into();
         numbers["faces_turned_in_examples"] = before.len().into();
         numbers["turned"] = turned.into();
         let json = self.json.as_ref().map(|path| draft_json(path, &numbers));

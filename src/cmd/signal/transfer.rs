@@ -102,15 +102,14 @@ impl TransferVerb {
             .outputs
             .write(&moved, b.sequence.positions(), numbers)?;
         say(&format!(
-            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {} faces newly inside out{}",
+            "{}: {} frames of V = {} in {} space by {} examples, which miss {:.2}% of the motion; {}",
             self.outputs.out.display(),
             numbers["n"],
             numbers["V"],
             moved.space.name(),
             moved.representation.basis.ncols() + 1,
             100.0 * numbers["missed"].as_f64().unwrap_or(f64::NAN),
-            numbers["faces_turned"],
-            super::result::advice(&numbers, moved.space),
+            super::result::inside_out(&numbers, moved.space),
         ));
         Ok(true)
     }

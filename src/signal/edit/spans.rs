@@ -76,6 +76,9 @@ pub(super) fn reversed(
     bridge: usize,
 ) -> Result<Strand, EditProblem> {
     let (first, last) = within(&strand, frames)?;
+    if first == last && bridge == 0 {
+        return Ok(strand); // one frame backwards is that frame
+    }
     room(&strand, bridge.saturating_mul(2), 0)?;
     let strand = with_own_knots(strand, first, last)?;
     let seam = Seam::Across { frames: bridge };

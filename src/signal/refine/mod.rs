@@ -247,7 +247,10 @@ pub(super) fn refine_within(
     let psi = &fit.representation;
     let (parameters, m) = (&psi.time.parameters, psi.basis.ncols());
     let frames = Rows::of_frames(whole.coordinates.as_ref(), parameters, 0.0);
-    for _ in 0..WEIGHTS {
+    for attempt in 0..WEIGHTS {
+        if attempt > 0 {
+            refinement.between *= LIGHTER;
+        }
         let rows = Rows::of_frames(whole.coordinates.as_ref(), parameters, refinement.between);
         let (spline, sites) = (&psi.time.spline, &psi.pose.sites);
         let Some(found) = minimise_until(&rows, spline, sites, m, options, enough) else {
@@ -261,7 +264,6 @@ pub(super) fn refine_within(
             refinement.elapsed = start.elapsed();
             return (refined(whole, fit, found.signals, &frames), refinement);
         }
-        refinement.between *= LIGHTER;
     }
     refinement.elapsed = start.elapsed();
     (fit, refinement)
