@@ -32,16 +32,16 @@ impl Panels {
     }
 
     /// y += sum_j a_j x_j over the columns for several vectors y of weights a, with the bits of [`super::kernels::combine_fused`].
-    pub fn combine(&self, a: [&[f64]; TOGETHER], mut y: [&mut [f64]; TOGETHER]) {
+    pub fn combine(&self, a: [&[f64]; TOGETHER], y: &mut [&mut [f64]; TOGETHER]) {
         let panels = self.blocks.chunks_exact(self.columns.max(1));
         for (first, panel) in (0..self.rows).step_by(LANES).zip(panels) {
             let last = (first + LANES).min(self.rows);
             let mut sums = [[0.0; LANES]; TOGETHER];
-            for (sum, y) in sums.iter_mut().zip(&y) {
+            for (sum, y) in sums.iter_mut().zip(y.iter()) {
                 sum[..last - first].copy_from_slice(&y[first..last]);
             }
             combine_panel(a, panel, &mut sums);
-            for (sum, y) in sums.iter().zip(&mut y) {
+            for (sum, y) in sums.iter().zip(y.iter_mut()) {
                 y[first..last].copy_from_slice(&sum[..last - first]);
             }
         }
@@ -85,7 +85,7 @@ mod tests {
                 combine_fused(a, |j| x.col_as_slice(j), y);
             }
             let weights = weights.each_ref().map(|a| &a[..]);
-            Panels::new(x.as_ref()).combine(weights, found.each_mut().map(|y| &mut y[..]));
+            Panels::new(x.as_ref()).combine(weights, &mut found.each_mut().map(|y| &mut y[..]));
             assert_eq!(found, expected);
         }
     }

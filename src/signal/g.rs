@@ -1,6 +1,7 @@
 //! The pose signal g: a thin-plate approximation from the pose plane to shape coordinates (sections 2.2 and 3.2).
 
-use faer::{Accum, Mat, MatRef, unzip, zip};
+use faer::prelude::ReborrowMut;
+use faer::{Accum, Mat, MatMut, MatRef, unzip, zip};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -93,52 +94,52 @@ impl PoseSignal {
         axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
     }
 
-    /// g at many points, m x q, with the same bits as one by one.
+    /// g at many points, m x q, with the same bits as one by one. O(l m q).
     pub fn evaluate(&self, points: &[Point]) -> Mat<f64> {
-        let m = self.coefficients.nrows();
-        let mut values = vec![0.0; m * points.len()];
+        let (l, m) = (self.sites.len(), self.coefficients.nrows());
+        let mut values = Mat::zeros(m, points.len());
         if m > 0 {
-            let l = self.sites.len();
             let panels = Panels::new(self.coefficients.get(.., 1..l + 1));
             let together = panels::TOGETHER;
             let alone = ALONE / (together * m * (l + 1)) + 1;
             values
-                .par_chunks_mut(m * together)
+                .par_col_chunks_mut(together)
                 .zip(points.par_chunks(together))
                 .with_min_len(alone)
                 .for_each_init(
                     || vec![0.0; l * together],
-                    |bends, (x, points)| self.evaluate_together(&panels, points, bends, x),
+                    |bends, (values, points)| {
+                        self.evaluate_together(&panels, points, bends, values);
+                    },
                 );
         }
-        MatRef::from_column_major_slice(&values, m, points.len()).to_owned()
+        values
     }
 
-    /// g at a few points, m numbers each. `bends` has room for the kernels of all.
+    /// g at a few points, one a column. `bends` has room for the kernels of all.
     fn evaluate_together(
         &self,
         panels: &Panels,
         points: &[Point],
         bends: &mut [f64],
-        values: &mut [f64],
+        values: MatMut<'_, f64>,
     ) {
-        let (l, m) = (self.sites.len(), self.coefficients.nrows());
-        for (i, (x, &p)) in values.chunks_exact_mut(m).zip(points).enumerate() {
+        let l = self.sites.len();
+        let columns = values.col_iter_mut();
+        let columns = columns.filter_map(|column| column.try_as_col_major_mut());
+        let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
+        for (i, (x, &p)) in columns.iter_mut().zip(points).enumerate() {
             kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
             x.copy_from_slice(self.coefficients.col_as_slice(0));
         }
         let weights = |i: usize| &bends[i * l..(i + 1) * l];
-        let mut each = values.chunks_exact_mut(m);
-        match points.len() == panels::TOGETHER {
-            true => {
-                let each = std::array::from_fn(|_| each.next().unwrap_or_default());
-                panels.combine(std::array::from_fn(weights), each);
-            }
-            false => each.enumerate().for_each(|(i, x)| {
+        match columns.as_mut_slice().as_mut_array() {
+            Some(all) => panels.combine(std::array::from_fn(weights), all),
+            None => columns.iter_mut().enumerate().for_each(|(i, x)| {
                 combine_fused(weights(i), |j| self.coefficients.col_as_slice(j + 1), x);
             }),
         }
-        for (&p, x) in points.iter().zip(values.chunks_exact_mut(m)) {
+        for (&p, x) in points.iter().zip(columns) {
             axpy(p[0], self.coefficients.col_as_slice(l + 1), x);
             axpy(p[1], self.coefficients.col_as_slice(l + 2), x);
         }
@@ -163,7 +164,8 @@ fn interpolant(
     design.side.apply_transpose(&mut right);
     let factor = Cholesky::new(conditioned.get(affine.., affine..).to_owned())?;
     let (mut head, mut weights) = right.split_at_row_mut(affine);
-    factor.solve_many(weights.as_mut());
+    let (some, others) = weights.rb_mut().split_at_col_mut(coordinates.nrows() / 2);
+    rayon::join(|| factor.solve_many(some), || factor.solve_many(others));
     multiply(
         head.as_mut(),
         Accum::Add,

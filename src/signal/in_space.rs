@@ -116,7 +116,10 @@ pub fn fit_in_space_to_rms_refined(
         let untouched = Refinement::none(&fit, options);
         Ok((fit, untouched))
     };
-    to_rms(space, frames, rms, (layout, pins), refined, interpolating)
+    let start = Instant::now();
+    let mut found = to_rms(space, frames, rms, (layout, pins), refined, interpolating)?;
+    found.1.elapsed = start.elapsed();
+    Ok(found)
 }
 
 fn interpolate(

@@ -28,7 +28,8 @@ An edit is a table [[edit]] with `do` and:
   do = \"refine\"   frames = \"3..5\": more control points there, the same curve
 Frames and control points count from 1. What stands after `;` may be left out: `frames` is then as
 many as keep the mean pace, `control` in proportion, `times` (in addition to the first) 1, `join`,
-the new frames at each seam, 0. `signal info --places` and `--json` show where frames and control
+the new frames at each seam, 0. A loop runs through its points as nearly as its control points let
+it: with fewer of them than it has turns it cuts corners. `signal info --places` and `--json` show where frames and control
 points are.";
 
 #[derive(Args)]

@@ -138,9 +138,12 @@ fn numbers(row: &TradeOff, layout: Layout, size: f64) -> Value {
 
 fn describe(name: &str, v: &Value) -> String {
     let percent = |value: &Value| 100.0 * value.as_f64().unwrap_or(f64::NAN);
+    // The last of an even number has no neighbour behind it.
+    let alone = v["n"].as_u64().filter(|n| n % 2 == 0);
+    let alone = alone.map_or(String::new(), |n| format!(", but not frame {n}"));
     let mut lines = vec![
         format!(
-            "{name}: {} space, {} of {} frames kept, the others predicted; vertex RMS over the first frame's diagonal",
+            "{name}: {} space, {} of {} frames kept, the others predicted{alone}; vertex RMS over the first frame's diagonal",
             v["space"].as_str().unwrap_or(""),
             v["kept"],
             v["n"],
