@@ -155,7 +155,7 @@ fn least_l_and_k(
         if let Some((k, attempt)) = least_k(base, &order.order[..l], most, rule)? {
             let numbers = l * (base.dimension() + 2) + 3 * k;
             if best.as_ref().is_none_or(|(least, _)| numbers < *least) {
-                best = Some((numbers, attempt.from_search(&order, l, searching)));
+                best = Some((numbers, attempt.searched(&order, l, searching)));
             }
         }
     }

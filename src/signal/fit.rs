@@ -523,10 +523,10 @@ pub(super) struct Attempt {
 
 impl Attempt {
     /// The same, said to have the first l sites of a search that took this long.
-    pub(super) fn from_search(mut self, searched: &SiteOrder, l: usize, g: Duration) -> Self {
+    pub(super) fn searched(mut self, search: &SiteOrder, l: usize, g: Duration) -> Self {
         self.sites = SiteOrder {
-            order: searched.order[..l].to_vec(),
-            errors: searched.errors.clone(),
+            order: search.order[..l].to_vec(),
+            errors: search.errors.clone(),
         };
         self.timings.g = g;
         self

@@ -77,7 +77,7 @@ pub fn source_files(path: &Path) -> Result<Vec<PathBuf>, FormatError> {
     frame_files(path)
 }
 
-/// The file or folder that [`write`] makes of `path`, and the mesh beside it where there is one.
+/// The file or folder that [`write()`] makes of `path`, and the mesh beside it where there is one.
 pub fn written_files(path: &Path) -> Vec<PathBuf> {
     let beside = has_extension(path, "pc2").then(|| path.with_extension("obj"));
     [path.into()].into_iter().chain(beside).collect()

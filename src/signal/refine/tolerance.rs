@@ -117,7 +117,7 @@ impl Search<'_> {
             return Ok(None);
         };
         let found = least(4, most_k, |k| with(k, l))?;
-        Ok(found.map(|(_, attempt)| attempt.from_search(&order, l, searching)))
+        Ok(found.map(|(_, attempt)| attempt.searched(&order, l, searching)))
     }
 
     /// The signals as section 3 finds them, where refining takes them below the error.
