@@ -1,6 +1,5 @@
 //! The pose signal g: a thin-plate approximation from the pose plane to shape coordinates (sections 2.2 and 3.2).
 
-use faer::prelude::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, unzip, zip};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -164,8 +163,7 @@ fn interpolant(
     design.side.apply_transpose(&mut right);
     let factor = Cholesky::new(conditioned.get(affine.., affine..).to_owned())?;
     let (mut head, mut weights) = right.split_at_row_mut(affine);
-    let (some, others) = weights.rb_mut().split_at_col_mut(coordinates.nrows() / 2);
-    rayon::join(|| factor.solve_many(some), || factor.solve_many(others));
+    factor.solve_many(weights.as_mut());
     multiply(
         head.as_mut(),
         Accum::Add,
