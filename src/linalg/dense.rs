@@ -53,6 +53,13 @@ pub fn multiply(c: MatMut<'_, f64>, add: Accum, a: MatRef<'_, f64>, b: MatRef<'_
     clear_upper_halves();
 }
 
+/// The columns of a matrix whose columns are contiguous, as those of a [`Mat`] are; others are left out.
+pub fn columns_mut(matrix: MatMut<'_, f64>) -> Vec<&mut [f64]> {
+    let columns = matrix.col_iter_mut();
+    let columns = columns.filter_map(|column| column.try_as_col_major_mut());
+    columns.map(|column| column.as_slice_mut()).collect()
+}
+
 /// Eigenvalues by decreasing size and their unit eigenvectors as columns.
 pub struct SymmetricEigen {
     pub values: Vec<f64>,

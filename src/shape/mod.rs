@@ -44,6 +44,7 @@ use thiserror::Error;
 
 use self::partition::PatchError;
 use self::shell::Descent;
+use crate::linalg::dense::columns_mut;
 use crate::linalg::sparse::FactorError;
 use crate::mesh::Connectivity;
 
@@ -228,7 +229,7 @@ pub fn patches_for(
 /// chosen; the result does not depend on the number of threads.
 pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let mut z = encode_each(space, frames)?;
-    let mut columns = columns_mut(&mut z);
+    let mut columns = columns_mut(z.as_mut());
     for i in 1..columns.len() {
         let (before, after) = columns.split_at_mut(i);
         space.unwrap(before[i - 1], after[0]);
@@ -240,7 +241,7 @@ pub fn encode_all(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeEr
 /// [`Space::unwrap_over_surface`] chooses.
 pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let mut z = encode_each(space, frames)?;
-    if let Some((first, others)) = columns_mut(&mut z).split_first_mut() {
+    if let Some((first, others)) = columns_mut(z.as_mut()).split_first_mut() {
         others.par_iter_mut().for_each(|z| {
             space.unwrap(first, z);
             space.unwrap_over_surface(z);
@@ -249,20 +250,13 @@ pub fn encode_examples(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, Sh
     Ok(z)
 }
 
-/// The columns of a matrix of our own, which are contiguous.
-fn columns_mut(z: &mut Mat<f64>) -> Vec<&mut [f64]> {
-    let columns = z.col_iter_mut();
-    let columns = columns.filter_map(|column| column.try_as_col_major_mut());
-    columns.map(|column| column.as_slice_mut()).collect()
-}
-
 /// Every frame's vector on its own, with angles in their principal branches.
 fn encode_each(space: &dyn Space, frames: &[f64]) -> Result<Mat<f64>, ShapeError> {
     let len = space.frame_len().max(1);
     let n = frames.len() / len;
     reference::check_len("frames", frames, n * len)?;
     let mut z = Mat::zeros(space.dimension(), n);
-    let mut columns = columns_mut(&mut z);
+    let mut columns = columns_mut(z.as_mut());
     let both = columns.par_iter_mut().zip(frames.par_chunks_exact(len));
     first_error(
         both.enumerate()

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::Point;
 use super::thin_plate::{Frame, kernels};
-use crate::linalg::dense::{Cholesky, Qr, multiply};
+use crate::linalg::dense::{Cholesky, Qr, columns_mut, multiply};
 use crate::linalg::kernels::{axpy, combine_fused, dot};
 use crate::linalg::panels::{self, Panels};
 
@@ -124,9 +124,7 @@ impl PoseSignal {
         values: MatMut<'_, f64>,
     ) {
         let l = self.sites.len();
-        let columns = values.col_iter_mut();
-        let columns = columns.filter_map(|column| column.try_as_col_major_mut());
-        let mut columns: Vec<&mut [f64]> = columns.map(|column| column.as_slice_mut()).collect();
+        let mut columns = columns_mut(values);
         for (i, (x, &p)) in columns.iter_mut().zip(points).enumerate() {
             kernels(p, &self.sites, &mut bends[i * l..(i + 1) * l]);
             x.copy_from_slice(self.coefficients.col_as_slice(0));

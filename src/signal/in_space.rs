@@ -14,7 +14,7 @@ use super::pins::Pin;
 use super::psi::Representation;
 use super::refine::tolerance::choose_refined;
 use super::refine::{RefineOptions, Refinement, refine};
-use crate::shape::{Convergence, ShapeError, Space, decode_all, decode_all_telling, encode_all};
+use crate::shape::{Convergence, ShapeError, Space, decode_all_telling, encode_all};
 
 /// Fits tried until the vertices are near enough.
 const ATTEMPTS: usize = 12;
@@ -200,9 +200,18 @@ pub fn sample_in_space(
     representation: &Representation,
     times: &[f64],
 ) -> Result<Vec<f64>, ShapeError> {
+    Ok(sample_telling(space, representation, times)?.0)
+}
+
+/// [`sample_in_space`], and how decoding converged.
+fn sample_telling(
+    space: &dyn Space,
+    representation: &Representation,
+    times: &[f64],
+) -> Result<(Vec<f64>, Convergence), ShapeError> {
     let z = representation.evaluate(times);
     let d = representation.dimension();
-    decode_all(space, MatRef::from_column_major_slice(&z, d, times.len()))
+    decode_all_telling(space, MatRef::from_column_major_slice(&z, d, times.len()))
 }
 
 /// The mean square distance of the vertices of psi(i), decoded, from those of frame i, of each of the n frames; and how decoding converged.
@@ -213,9 +222,7 @@ pub fn mean_squares(
 ) -> Result<(Vec<f64>, Convergence), ShapeError> {
     let n = representation.time.frame_count();
     let times: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let z = representation.evaluate(&times);
-    let z = MatRef::from_column_major_slice(&z, representation.dimension(), n);
-    let (decoded, convergence) = decode_all_telling(space, z)?;
+    let (decoded, convergence) = sample_telling(space, representation, &times)?;
     let len = space.frame_len();
     let of_frame = |(a, b): (&[f64], &[f64])| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
