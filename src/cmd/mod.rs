@@ -77,8 +77,28 @@ enum Verb {
     Signal(signal::Signal),
 }
 
+impl Verb {
+    fn run(self) -> Outcome {
+        match self {
+            Verb::Verify(verb) => verb.run(),
+            Verb::Measure(verb) => verb.run(),
+            Verb::Compare(verb) => verb.run(),
+            Verb::Report(verb) => verb.run(),
+            Verb::List(verb) => verb.run(),
+            Verb::Doctor => doctor::run(),
+            Verb::Data(verb) => verb.run(),
+            Verb::Info(verb) => verb.run(),
+            Verb::Convert(verb) => verb.run(),
+            Verb::Signal(verb) => verb.run(),
+        }
+    }
+}
+
 /// More threads only wait for each other.
 const MOST_THREADS: usize = 1024;
+
+/// Bytes of a thread's stack: as many as a program's first thread has on most systems.
+const STACK: usize = 8 << 20;
 
 /// Frames of a sequence.
 #[derive(Args, Clone)]
@@ -157,29 +177,32 @@ fn whole(range: &'static str) -> impl Fn(&str) -> Result<usize, String> + Clone 
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    if let Some(threads) = cli.threads {
-        if !(1..=MOST_THREADS).contains(&threads) {
-            eprintln!("meshseq: --threads {threads}: expected 1 to {MOST_THREADS}");
-            return ExitCode::from(2);
-        }
-        // A pool that stands already is the only failure, and then its size stands too.
-        let _ = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global();
+    let Cli { threads, verb } = Cli::parse();
+    if let Some(threads) = threads
+        && !(1..=MOST_THREADS).contains(&threads)
+    {
+        eprintln!("meshseq: --threads {threads}: expected 1 to {MOST_THREADS}");
+        return ExitCode::from(2);
     }
-    let outcome = match cli.verb {
-        Verb::Verify(verb) => verb.run(),
-        Verb::Measure(verb) => verb.run(),
-        Verb::Compare(verb) => verb.run(),
-        Verb::Report(verb) => verb.run(),
-        Verb::List(verb) => verb.run(),
-        Verb::Doctor => doctor::run(),
-        Verb::Data(verb) => verb.run(),
-        Verb::Info(verb) => verb.run(),
-        Verb::Convert(verb) => verb.run(),
-        Verb::Signal(verb) => verb.run(),
-    };
+    // A pool that stands already is the only failure, and then its size stands too.
+    let _ = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or_else(default_threads))
+        .stack_size(STACK)
+        .build_global();
+    // In a thread of the pool: from any other one, each piece of parallel work would wait for one of these to wake up.
+    rayon::scope(|_| conclude(verb.run()))
+}
+
+/// 0, which is rayon's own choice, but for more threads than any machine has use for in its environment variable.
+fn default_threads() -> usize {
+    let asked = std::env::var("RAYON_NUM_THREADS").ok();
+    let asked = asked.and_then(|threads| threads.parse().ok());
+    asked
+        .filter(|&threads: &usize| threads > MOST_THREADS)
+        .map_or(0, |_| MOST_THREADS)
+}
+
+fn conclude(outcome: Outcome) -> ExitCode {
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),

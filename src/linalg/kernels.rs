@@ -26,65 +26,39 @@ macro_rules! vectorised {
 }
 pub(crate) use vectorised;
 
-/// [`vectorised`], and compiled for AVX-512 as well: for loops that keep eight lanes busy throughout, which others do not gain from.
-macro_rules! vectorised_wider {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
-        $(#[$doc])*
-        #[inline]
-        $vis fn $name($($arg: $type),*) $(-> $out)? {
-            #[inline(always)]
-            fn whole($($arg: $type),*) $(-> $out)? $body
-            #[cfg(target_arch = "x86_64")]
-            {
-                #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-                fn wider($($arg: $type),*) $(-> $out)? { whole($($arg),*) }
-                if $crate::linalg::kernels::has_avx512() {
-                    // SAFETY: the processor has just been seen to have these instructions.
-                    return unsafe { wider($($arg),*) };
-                }
-            }
-            $crate::linalg::kernels::vectorised! {
-                fn narrower($($arg: $type),*) $(-> $out)? { whole($($arg),*) }
-            }
-            narrower($($arg),*)
-        }
-    };
-}
-pub(crate) use vectorised_wider;
-
 /// Compiles a body whose products are fused with sums (`f64::mul_add`, rounded once) for AVX-512, for AVX2, and for the baseline, where a function call
 /// takes the place of the instruction: slow, but the same bits.
 macro_rules! fused {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<const $p:ident: usize>)? ($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
         #[inline]
-        $vis fn $name($($arg: $type),*) {
+        $vis fn $name$(<const $p: usize>)?($($arg: $type),*) {
             #[inline(always)]
-            fn body($($arg: $type),*) $body
+            fn body$(<const $p: usize>)?($($arg: $type),*) $body
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-                fn wider($($arg: $type),*) { body($($arg),*) }
+                fn wider$(<const $p: usize>)?($($arg: $type),*) { body$(::<$p>)?($($arg),*) }
                 #[target_feature(enable = "avx2,fma")]
-                fn wide($($arg: $type),*) { body($($arg),*) }
+                fn wide$(<const $p: usize>)?($($arg: $type),*) { body$(::<$p>)?($($arg),*) }
                 if std::arch::is_x86_feature_detected!("fma") {
                     if $crate::linalg::kernels::has_avx512() {
                         // SAFETY: the processor has just been seen to have these instructions.
-                        return unsafe { wider($($arg),*) };
+                        return unsafe { wider$(::<$p>)?($($arg),*) };
                     }
                     if std::arch::is_x86_feature_detected!("avx2") {
                         // SAFETY: as above.
-                        return unsafe { wide($($arg),*) };
+                        return unsafe { wide$(::<$p>)?($($arg),*) };
                     }
                 }
             }
-            body($($arg),*)
+            body$(::<$p>)?($($arg),*)
         }
     };
 }
 pub(crate) use fused;
 
-/// Whether the processor has the instructions that `vectorised_wider` asks for.
+/// Whether the processor has the instructions of AVX-512 that `fused` asks for.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 pub fn has_avx512() -> bool {
@@ -101,6 +75,17 @@ pub fn clear_upper_halves() {
         // SAFETY: the processor has just been seen to have AVX; no value is kept in the upper halves across a call.
         unsafe { std::arch::x86_64::_mm256_zeroupper() };
     }
+}
+
+/// Keeps the compiler from taking several rounds of a loop together, where each round by itself is a whole number of vector instructions: it would
+/// gather each lane from memory.
+#[inline(always)]
+pub fn one_at_a_time() {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: no instruction at all.
+    unsafe {
+        std::arch::asm!("", options(nomem, nostack, preserves_flags))
+    };
 }
 
 /// The number of lanes of a sum.

@@ -9,6 +9,8 @@ pub mod elimination;
 pub mod kernels;
 pub mod panels;
 pub mod pca;
+pub mod reflections;
 pub mod rotation;
 pub mod sparse;
 pub mod sweeps;
+pub mod triangle;

@@ -57,6 +57,7 @@ pub mod sketch;
 mod strand;
 pub mod stress;
 pub mod thin_plate;
+mod thin_plate_fit;
 pub mod transfer;
 pub mod windows;
 pub mod windows_file;

@@ -3,10 +3,11 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::Point;
-use crate::linalg::kernels::vectorised_wider;
+use crate::linalg::kernels::{LANES, fused, one_at_a_time};
+use crate::linalg::panels::Eight;
 
-/// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches, so that a loop over it
-/// becomes vector instructions, and with the same bits on every machine.
+/// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches and with products fused with
+/// sums, so that a loop over it becomes vector instructions, and with the same bits on every machine.
 #[inline(always)]
 fn ln(x: f64) -> f64 {
     const LN2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
@@ -21,14 +22,15 @@ fn ln(x: f64) -> f64 {
     let s = f / (2.0 + f);
     let (z, half) = (s * s, 0.5 * f * f);
     let w = z * z;
-    let even = w
-        * (3.999_999_999_940_942e-1
-            + w * (2.222_219_843_214_978_4e-1 + w * 1.531_383_769_920_937_3e-1));
-    let odd = z
-        * (6.666_666_666_666_735e-1
-            + w * (2.857_142_874_366_239e-1
-                + w * (1.818_357_216_161_805e-1 + w * 1.479_819_860_511_658_6e-1)));
-    s * (half + (odd + even)) + k * LN2[1] - half + f + k * LN2[0]
+    let even = 1.531_383_769_920_937_3e-1_f64
+        .mul_add(w, 2.222_219_843_214_978_4e-1)
+        .mul_add(w, 3.999_999_999_940_942e-1);
+    let odd = 1.479_819_860_511_658_6e-1_f64
+        .mul_add(w, 1.818_357_216_161_805e-1)
+        .mul_add(w, 2.857_142_874_366_239e-1)
+        .mul_add(w, 6.666_666_666_666_735e-1);
+    let rest = even.mul_add(w, odd.mul_add(z, half));
+    k.mul_add(LN2[0], f - (half - s.mul_add(rest, k * LN2[1])))
 }
 
 /// phi(r) = r^2 ln r as a function of r^2, with phi(0) = 0 (reading 4).
@@ -41,22 +43,48 @@ pub fn kernel(r_squared: f64) -> f64 {
     }
 }
 
-vectorised_wider! {
+fused! {
     /// phi(||site - p||) for each point p, into `values`.
     pub fn kernels(site: Point, points: &[Point], values: &mut [f64]) {
         for (value, p) in values.iter_mut().zip(points) {
             let (x, y) = (site[0] - p[0], site[1] - p[1]);
-            *value = kernel(x * x + y * y);
+            *value = kernel(x.mul_add(x, y * y));
         }
     }
 }
 
-vectorised_wider! {
+/// Eight points, one axis after the other.
+pub type EightPoints = [Eight; 2];
+
+/// Up to eight points, the last of them as often as it takes to fill the eight.
+pub fn eight_points(points: &[Point]) -> EightPoints {
+    let last = points.len().saturating_sub(1);
+    [0, 1].map(|axis| std::array::from_fn(|i| points.get(i.min(last)).map_or(0.0, |p| p[axis])))
+}
+
+fused! {
+    /// phi(||site - p||) of eight points p for each site, with the bits of [`kernels`].
+    pub fn kernels_of_eight(points: &EightPoints, sites: &[Point], values: &mut [Eight]) {
+        let [px, py] = *points;
+        for (value, s) in values.iter_mut().zip(sites) {
+            one_at_a_time();
+            for lane in 0..LANES {
+                let (x, y) = (s[0] - px[lane], s[1] - py[lane]);
+                value[lane] = x.mul_add(x, y * y);
+            }
+        }
+        for value in values.as_flattened_mut() {
+            *value = kernel(*value);
+        }
+    }
+}
+
+fused! {
     /// The gradient with respect to the place p of phi(||site - p||) for each site, one axis after the other: (2 ln r + 1) (p - site), and 0 at a site.
     pub fn kernel_gradients(p: Point, sites: &[Point], x: &mut [f64], y: &mut [f64]) {
         for ((s, x), y) in sites.iter().zip(x).zip(y) {
             let d = [p[0] - s[0], p[1] - s[1]];
-            let r_squared = d[0] * d[0] + d[1] * d[1];
+            let r_squared = d[0].mul_add(d[0], d[1] * d[1]);
             let factor = if r_squared >= f64::MIN_POSITIVE { ln(r_squared) + 1.0 } else { 0.0 };
             *x = factor * d[0];
             *y = factor * d[1];

@@ -26,7 +26,7 @@ use self::rows::Rows;
 use super::Point;
 use super::f::Spline;
 use super::fit::{Errors, Fit, FitError};
-use super::g::{PoseSignal, in_given_units};
+use super::g::PoseSignal;
 use super::h::{ShapeSignal, shape_signal};
 use super::psi::{Representation, TimeSignal};
 use super::thin_plate::Frame;
@@ -198,7 +198,7 @@ fn signals(
     given: &[Point],
 ) -> Signals {
     let coefficients = found.projection.coefficients();
-    let weights = found.projection.design.kernel_weights(&coefficients);
+    let plate = found.projection.design.plate(coefficients.as_ref());
     let restore = |points: &[Point]| points.iter().map(|&q| frame.restore(q)).collect();
     let Unknowns { control, sites } = &found.unknowns;
     Signals {
@@ -207,7 +207,7 @@ fn signals(
             knots: spline.knots.clone(),
         },
         pose: PoseSignal {
-            coefficients: in_given_units(frame, sites, &weights, coefficients.get(..3, ..)),
+            coefficients: plate.in_given_units(frame, sites),
             sites: match problem.sites_held {
                 true => given.to_vec(),
                 false => restore(sites),

@@ -5,6 +5,7 @@ use faer::{Accum, Mat, MatRef};
 use super::projection::{Problem, Projection, Unknowns, scale_rows};
 use crate::linalg::banded::BAND;
 use crate::linalg::dense::{Cholesky, multiply};
+use crate::linalg::kernels::LANES;
 use crate::signal::basis::Local;
 use crate::signal::thin_plate::kernel_gradients;
 
@@ -149,7 +150,8 @@ struct Moves {
 impl Moves {
     fn new(problem: &Problem, projection: &Projection, gradients: MatRef<'_, f64>) -> Self {
         let coefficients = projection.coefficients();
-        let weights = projection.design.kernel_weights(&coefficients);
+        let plate = projection.design.plate(coefficients.as_ref());
+        let weights = plate.weights.transposed().rows_matrix();
         let (count, l) = (gradients.nrows(), weights.nrows());
         let slopes = [0, 1].map(|axis| {
             let kernels = gradients.get(.., axis * l..(axis + 1) * l);
@@ -225,15 +227,20 @@ fn gradients(problem: &Problem, unknowns: &Unknowns, projection: &Projection) ->
 /// conditions, for a site moved along x or y by a unit whose kernel has the coefficient 1.
 fn corrections(problem: &Problem, projection: &Projection) -> Mat<f64> {
     let design = &projection.design;
-    // W = Q R, so W (W^T W)^-1 = Q R^-T, and the first three rows of `bends` are Q^T times the kernels.
-    let r = |i, j| design.side.r(i, j);
-    let kernels = &design.bends;
-    Mat::from_fn(projection.curve.len(), 2, |row, axis| {
-        // z = R^-1 (Q^T kernels) by back substitution; its entries 1 and 2 belong to x and y.
-        let y = kernels[(2, row)] / r(2, 2);
-        let x = (kernels[(1, row)] - r(1, 2) * y) / r(1, 1);
-        problem.roots[row] * [x, y][axis]
-    })
+    // W = Q R, so W (W^T W)^-1 = Q R^-T, and the first three of the `sums` are Q^T times the kernels.
+    let mut corrections = Mat::zeros(projection.curve.len(), 2);
+    let Some(sums) = design.sums.iter().next() else {
+        return corrections;
+    };
+    for ((row, sum), root) in sums.iter().enumerate().zip(&problem.roots) {
+        // z = R^-1 (Q^T kernels); its entries 1 and 2 belong to x and y.
+        let mut z = [[0.0; LANES]; LANES];
+        (0..3).for_each(|i| z[i][0] = sum[i]);
+        design.side.r().solve(&mut z);
+        corrections[(row, 0)] = root * z[1][0];
+        corrections[(row, 1)] = root * z[2][0];
+    }
+    corrections
 }
 
 fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {

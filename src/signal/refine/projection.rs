@@ -6,7 +6,7 @@ use super::rows::Rows;
 use crate::linalg::dense::{Qr, ThinSvd, thin_svd};
 use crate::signal::Point;
 use crate::signal::basis::{Local, apply, rows};
-use crate::signal::g::Design;
+use crate::signal::thin_plate_fit::Design;
 
 /// Columns of the design closer to dependent than this are none to divide by: sites have run into one another.
 const INDEPENDENT: f64 = 1e-10;

@@ -1,0 +1,181 @@
+//! An upper triangular matrix in panels, as a QR or a Cholesky factorisation leaves it, and its solutions for eight vectors at a time.
+
+use super::kernels::{LANES, fused};
+use super::panels::{Eight, Panels, filled, subtract_gathered, subtract_spread};
+
+/// R, upper triangular: its columns in panels of eight, each down to the diagonal.
+#[derive(Clone, Debug, Default)]
+pub struct Triangle {
+    /// Panel p has 8 p entries above the corner and 8 of the corner, whose entries below the diagonal are not read.
+    entries: Vec<Eight>,
+    /// 1 / R_ii; for columns that only fill up the last panel what it takes to leave them alone (1), or to make solutions 0 there (0).
+    inverses: Vec<Eight>,
+}
+
+impl Triangle {
+    /// R of A = R^T R, with a positive diagonal, for a symmetric positive definite A of as many vectors as entries, of which the lower triangle is read
+    /// (and what shares an eight with it); None where it is not positive definite. O(n^3 / 3).
+    pub fn cholesky(a: &Panels) -> Option<Self> {
+        let mut factor = Self::default();
+        let mut above = Vec::with_capacity(a.length());
+        for (first, panel) in (0..a.vectors()).step_by(LANES).zip(a.iter()) {
+            above.clear();
+            above.extend_from_slice(&panel[..first]);
+            factor.solve_transposed(&mut above);
+            let mut rest = bordered(&panel[first..]);
+            subtract_gathered(&above, &above, &mut rest);
+            let (corner, inverses) = corner_factor(&rest)?;
+            factor.push(&above, &corner, inverses);
+        }
+        Some(factor)
+    }
+
+    /// Adds eight columns: what is above the corner, the corner, and the inverses of its diagonal.
+    pub fn push(&mut self, above: &[Eight], corner: &[Eight; LANES], inverses: Eight) {
+        self.entries.extend_from_slice(above);
+        self.entries.extend_from_slice(corner);
+        self.inverses.push(inverses);
+    }
+
+    /// The number of panels.
+    fn count(&self) -> usize {
+        self.inverses.len()
+    }
+
+    /// Above the corner of a panel, and the corner.
+    fn panel(&self, p: usize) -> (&[Eight], &[Eight; LANES]) {
+        let first = LANES * (p * (p + 1) / 2);
+        let (above, rest) = self.entries[first..].split_at(LANES * p);
+        (above, rest.first_chunk().expect("a panel has a corner"))
+    }
+
+    /// Replaces eight vectors b, entry by entry, by R^-1 b: as many entries as R has columns, in whole eights.
+    pub fn solve(&self, b: &mut [Eight]) {
+        for p in (0..self.count()).rev() {
+            let (above, corner) = self.panel(p);
+            let (head, x) = part(b, p);
+            solve_corner(corner, &self.inverses[p], x);
+            subtract_spread(above, x, head);
+        }
+    }
+
+    /// Replaces eight vectors b, entry by entry, by R^-T b.
+    pub fn solve_transposed(&self, b: &mut [Eight]) {
+        for p in 0..self.count() {
+            let (above, corner) = self.panel(p);
+            let (head, x) = part(b, p);
+            subtract_gathered(above, head, x);
+            solve_corner_transposed(corner, &self.inverses[p], x);
+        }
+    }
+}
+
+/// The entries before those of a panel, and its own.
+fn part(b: &mut [Eight], p: usize) -> (&mut [Eight], &mut [Eight; LANES]) {
+    let (head, rest) = b.split_at_mut(LANES * p);
+    (head, rest.first_chunk_mut().expect("eight entries a panel"))
+}
+
+/// Eight rows of a corner of a symmetric matrix, filled up by those of the identity.
+fn bordered(corner: &[Eight]) -> [Eight; LANES] {
+    let mut eight = filled(corner);
+    for i in corner.len()..LANES {
+        eight.iter_mut().for_each(|row| row[i] = 0.0);
+        eight[i][i] = 1.0;
+    }
+    eight
+}
+
+/// R with A = R^T R for eight columns of a symmetric matrix, and the inverses of its diagonal.
+fn corner_factor(a: &[Eight; LANES]) -> Option<([Eight; LANES], Eight)> {
+    let (mut r, mut inverses) = (*a, [0.0; LANES]);
+    for i in 0..LANES {
+        // What the rows above have left of row i, which by symmetry is column i of A from the diagonal on.
+        let mut row: Eight = std::array::from_fn(|j| a[i.min(j)][i.max(j)]);
+        for above in &r[..i] {
+            for j in i..LANES {
+                row[j] -= above[i] * above[j];
+            }
+        }
+        if !(row[i] > 0.0 && row[i] < f64::INFINITY) {
+            return None;
+        }
+        let root = row[i].sqrt();
+        inverses[i] = 1.0 / root;
+        r[i] = row.map(|x| x / root);
+        r[i][i] = root;
+    }
+    Some((r, inverses))
+}
+
+fused! {
+    fn solve_corner(corner: &[Eight; LANES], inverses: &Eight, x: &mut [Eight; LANES]) {
+        let mut own = *x;
+        for i in (0..LANES).rev() {
+            let mut sum = own[i];
+            for j in i + 1..LANES {
+                for lane in 0..LANES {
+                    sum[lane] = (-corner[i][j]).mul_add(own[j][lane], sum[lane]);
+                }
+            }
+            own[i] = sum.map(|x| x * inverses[i]);
+        }
+        *x = own;
+    }
+}
+
+fused! {
+    fn solve_corner_transposed(corner: &[Eight; LANES], inverses: &Eight, x: &mut [Eight; LANES]) {
+        let mut own = *x;
+        for i in 0..LANES {
+            let mut sum = own[i];
+            for j in 0..i {
+                for lane in 0..LANES {
+                    sum[lane] = (-corner[j][i]).mul_add(own[j][lane], sum[lane]);
+                }
+            }
+            own[i] = sum.map(|x| x * inverses[i]);
+        }
+        *x = own;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use faer::Mat;
+
+    use super::*;
+
+    /// A positive definite matrix, and right sides for eight vectors.
+    fn system(n: usize) -> (Mat<f64>, Vec<Eight>) {
+        let root = Mat::from_fn(n + 3, n, |i, j| ((i + 2) as f64 * (j as f64 + 0.7)).sin());
+        let x = |i: usize, lane: usize| ((3 * i + 5 * lane) as f64).cos();
+        let x = (0..n).map(|i| std::array::from_fn(|lane| x(i, lane)));
+        (root.transpose() * &root, x.collect())
+    }
+
+    #[test]
+    fn cholesky_solves_what_is_positive_definite_and_refuses_the_rest() {
+        for n in [0, 5, 8, 24, 43] {
+            let (a, x) = system(n);
+            let panels = |sign: f64| {
+                let a = sign * &a;
+                Panels::of_rows(n, n, |j| a.col(j))
+            };
+            let factor = Triangle::cholesky(&panels(1.0)).unwrap();
+            let mut b: Vec<Eight> = (0..n)
+                .map(|i| std::array::from_fn(|lane| (0..n).map(|j| a[(i, j)] * x[j][lane]).sum()))
+                .collect();
+            b.resize(n.next_multiple_of(LANES), [0.0; LANES]);
+            factor.solve_transposed(&mut b);
+            factor.solve(&mut b);
+            for (b, x) in b.iter().zip(&x) {
+                assert!(
+                    b.iter().zip(x).all(|(b, x)| (b - x).abs() < 1e-6),
+                    "{b:?} {x:?}"
+                );
+            }
+            assert_eq!(Triangle::cholesky(&panels(-1.0)).is_some(), n == 0);
+        }
+    }
+}
