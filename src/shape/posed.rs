@@ -10,6 +10,11 @@ use crate::mesh::vector::{Point, along, cross, dot, norm, sub};
 /// The sine below which a triangle's corners lie on a line.
 pub const COLLINEAR: f64 = 1e-14;
 
+/// The square of the sine above which a single cross product of a triangle's edges gives its normal to rounding.
+const WIDE: f64 = 1e-2;
+/// Products below this may have lost digits.
+const PRECISE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 /// A unit vector's part across a line that is no longer than this is rounding.
 const NEARLY_ALONG: f64 = 1e-7;
 
@@ -58,7 +63,14 @@ pub fn posed(rest: &Triangle, [a, b, c]: [Point; 3]) -> Posed {
 
 /// The unit normal of a triangle with these corners, as [`posed`] has it.
 pub fn normal(rest: &Triangle, [a, b, c]: [Point; 3]) -> Point {
-    let [first, second] = plane_axes(rest, sub(b, a), sub(c, a));
+    let (e1, e2) = (sub(b, a), sub(c, a));
+    let across = cross(e1, e2);
+    let square = dot(across, across);
+    if square > (WIDE * dot(e1, e1) * dot(e2, e2)).max(PRECISE) {
+        let length = square.sqrt();
+        return across.map(|x| x / length);
+    }
+    let [first, second] = plane_axes(rest, e1, e2);
     cross(first, second)
 }
 

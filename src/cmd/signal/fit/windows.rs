@@ -4,9 +4,11 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::super::output::{draft_json, progress, say};
-use super::super::{Failure, Outcome};
-use super::{Allowed, FitVerb, Fitted, How, astray, ratio, refine_numbers, stage_times};
+use super::super::ratio;
+use super::fitted::{Fitted, How, astray, refine_numbers, stage_times};
+use super::{Allowed, FitVerb};
+use crate::cmd::output::{draft_json, progress, say};
+use crate::cmd::{Failure, Outcome};
 use crate::mesh::measure::bounds;
 use crate::sequence::Sequence;
 use crate::signal::file::Stored;
