@@ -1,4 +1,4 @@
-//! `doctor`: each engine, its version, and how to get what is missing.
+//! `doctor`: each engine, what it answers, its version, and how to get what is missing.
 
 use super::output::say;
 use super::{Outcome, home};
@@ -14,8 +14,11 @@ pub fn run() -> Outcome {
         ..Options::default()
     };
     let session = Session::open(options, &cases)?;
+    let rows = session.engines();
+    let stages: Vec<String> = rows.iter().map(|row| brief(&row.stages)).collect();
+    let width = stages.iter().map(String::len).max().unwrap_or(0);
     let mut missing = 0;
-    for row in session.engines() {
+    for (row, stages) in rows.iter().zip(stages) {
         let found = row.missing.is_empty();
         missing += usize::from(!found);
         let (mark, text) = if found {
@@ -24,14 +27,8 @@ pub fn run() -> Outcome {
             ("MISSING", &row.missing)
         };
         say(&format!(
-            "{mark:<8} {:<14} {:<30} {text}",
-            row.engine,
-            row.stages
-                .replace("signal", "s")
-                .replace("sequence", "q")
-                .chars()
-                .take(30)
-                .collect::<String>()
+            "{mark:<8} {:<14} {stages:<width$}  {text}",
+            row.engine
         ));
     }
     if missing > 0 {
@@ -40,4 +37,14 @@ pub fn run() -> Outcome {
         ));
     }
     Ok(true)
+}
+
+/// The first of some stages, and how many more there are.
+fn brief(stages: &str) -> String {
+    let mut stages = stages.split_whitespace();
+    let first = stages.next().unwrap_or("no stage");
+    match stages.count() {
+        0 => first.to_owned(),
+        more => format!("{first} +{more}"),
+    }
 }

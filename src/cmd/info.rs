@@ -50,6 +50,7 @@ impl Info {
             "V": c.vertices, "F": c.faces, "E": c.edges, "d": sequence.dimension(),
             "unreferenced_vertices": c.unreferenced,
             "boundary_edges": c.boundary_edges, "non_manifold_edges": c.non_manifold_edges,
+            "disagreeing_edges": c.disagreeing_edges,
             "components": c.components, "euler": c.euler(),
             "area": area, "volume": volume,
             "bounds": {"min": first.min, "max": first.max}, "diagonal": first.diagonal(),
@@ -83,6 +84,12 @@ impl Info {
             c.non_manifold_edges,
             c.unreferenced
         ));
+        if c.disagreeing_edges > 0 {
+            say(&format!(
+                "faces disagree in orientation at {} edges: volumes and inside out mean little",
+                c.disagreeing_edges
+            ));
+        }
         say(&format!(
             "area {:.6} to {:.6}, volume {:.6} to {:.6}",
             area[0], area[1], volume[0], volume[1]

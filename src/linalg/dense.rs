@@ -275,14 +275,6 @@ impl Cholesky {
             b[j] = (b[j] - dot(&column[1..], &b[j + 1..])) / column[0];
         }
     }
-
-    /// Replaces B by A^-1 B. O(n^2) a column, many columns at a time.
-    pub fn solve_many(&self, mut b: MatMut<'_, f64>) {
-        let lower = self.lower.as_ref();
-        triangular_solve::solve_lower_triangular_in_place(lower, b.as_mut(), Par::Seq);
-        triangular_solve::solve_upper_triangular_in_place(lower.transpose(), b, Par::Seq);
-        clear_upper_halves();
-    }
 }
 
 #[cfg(test)]
@@ -325,20 +317,5 @@ mod tests {
         for (s, lambda) in svd.s.iter().zip(&eigen.values) {
             assert!((s * s - lambda).abs() < 1e-12 * eigen.values[0]);
         }
-    }
-
-    #[test]
-    fn cholesky_solves_what_is_positive_and_refuses_the_rest() {
-        let a = sample(9, 5);
-        let (gram, x) = (a.transpose() * &a, sample(5, 1));
-        let mut found = &gram * &x;
-        let factor = Cholesky::new(gram.clone()).unwrap();
-        factor.solve(found.col_as_slice_mut(0));
-        assert!((found - &x).norm_max() < 1e-8);
-        let x = sample(5, 3);
-        let mut found = &gram * &x;
-        factor.solve_many(found.as_mut());
-        assert!((found - &x).norm_max() < 1e-8);
-        assert!(Cholesky::new(-gram).is_none());
     }
 }

@@ -13,4 +13,4 @@ pub mod reflections;
 pub mod rotation;
 pub mod sparse;
 pub mod sweeps;
-pub mod triangle;
+pub mod upper_triangular;

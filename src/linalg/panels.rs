@@ -111,11 +111,6 @@ impl Panels {
         self.entries.chunks_exact_mut(self.length.max(1))
     }
 
-    /// [`Self::iter`], for several threads.
-    pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = &[Eight]> {
-        self.entries.par_chunks_exact(self.length.max(1))
-    }
-
     /// [`Self::iter_mut`], for several threads.
     pub fn par_iter_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [Eight]> {
         self.entries.par_chunks_exact_mut(self.length.max(1))

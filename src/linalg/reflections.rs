@@ -3,13 +3,13 @@
 
 use super::kernels::{LANES, fused};
 use super::panels::{Eight, Panels, gather, subtract_spread};
-use super::triangle::Triangle;
+use super::upper_triangular::UpperTriangular;
 
 /// A = Q R for a matrix A with at least as many rows as columns, of which P are in a panel.
 #[derive(Clone, Debug)]
 pub struct Reflections<const P: usize = LANES> {
     steps: Vec<Step<P>>,
-    r: Triangle,
+    r: UpperTriangular,
 }
 
 /// The reflections I - V T V^T for the columns of a panel.
@@ -38,7 +38,7 @@ impl Reflections {
         let columns = a.vectors();
         let mut found = Self {
             steps: Vec::new(),
-            r: Triangle::default(),
+            r: UpperTriangular::default(),
         };
         for (first, panel) in (0..columns).step_by(LANES).zip(a.iter_mut()) {
             found.apply_transpose(panel);
@@ -56,7 +56,7 @@ impl<const P: usize> Reflections<P> {
         let mut panel: Vec<Eight> = rows.iter().map(entry).collect();
         let mut found = Self {
             steps: Vec::new(),
-            r: Triangle::default(),
+            r: UpperTriangular::default(),
         };
         found.push(&[], &mut panel, count.min(P).min(LANES));
         found
@@ -91,7 +91,7 @@ impl<const P: usize> Reflections<P> {
     }
 
     /// R, whose diagonal may have any sign.
-    pub fn r(&self) -> &Triangle {
+    pub fn r(&self) -> &UpperTriangular {
         &self.r
     }
 }

@@ -67,6 +67,8 @@ pub struct Counts {
     pub boundary_edges: usize,
     /// Edges with more than two.
     pub non_manifold_edges: usize,
+    /// Edges with two whose orientations disagree.
+    pub disagreeing_edges: usize,
     /// Connected components; each unreferenced vertex is one.
     pub components: usize,
 }
@@ -143,6 +145,7 @@ pub fn counts(vertex_count: usize, faces: &[[u32; 3]]) -> Counts {
         faces: faces.len(),
         boundary_edges: topology.boundary().count(),
         non_manifold_edges: topology.non_manifold().count(),
+        disagreeing_edges: topology.disagreeing().count(),
         components: components(vertex_count, faces).1,
     }
 }
@@ -251,5 +254,13 @@ mod tests {
         let frames = measure_frames(&positions, 24, &CUBE);
         assert_eq!(frames.len(), 2);
         assert!((frames[1].volume - 8.0).abs() < 1e-14 && (frames[0].volume - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_face_turned_over_disagrees_at_its_three_edges() {
+        let mut faces = CUBE;
+        assert_eq!(counts(8, &faces).disagreeing_edges, 0);
+        faces[4].reverse();
+        assert_eq!(counts(8, &faces).disagreeing_edges, 3);
     }
 }

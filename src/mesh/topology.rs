@@ -110,6 +110,13 @@ impl Topology {
         self.with_triangles(|count| count > 2)
     }
 
+    /// Edges with two triangles that run along it the same way, so that one of them faces in and the other out.
+    pub fn disagreeing(&self) -> impl Iterator<Item = [u32; 2]> {
+        let fans = self.edges.iter().zip(self.fans());
+        fans.filter(|(_, fan)| matches!(fan, [a, b] if a.ascending == b.ascending))
+            .map(|(&edge, _)| edge)
+    }
+
     fn with_triangles(&self, wanted: impl Fn(usize) -> bool) -> impl Iterator<Item = [u32; 2]> {
         let fans = self.edges.iter().zip(self.fans());
         fans.filter(move |(_, fan)| wanted(fan.len()))

@@ -141,3 +141,25 @@ fn unit(x: Point) -> Option<Point> {
     let length = norm(x);
     (length > 0.0).then(|| x.map(|x| x / length))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wide triangles take one way to their normal and thin ones another.
+    #[test]
+    fn normals_are_those_of_the_axes_however_thin_the_triangle() {
+        let (a, b) = ([0.3, -0.2, 0.1], [1.1, 0.4, -0.3]);
+        let corners = |height: f64| {
+            let foot: Point = std::array::from_fn(|i| a[i] + 0.6 * (b[i] - a[i]));
+            [a, b, along(foot, height, [0.6, -0.8, 0.0])]
+        };
+        let rest = Triangle::new(corners(0.5)).unwrap();
+        for digits in 0..12 {
+            let corners = corners(10f64.powi(-digits));
+            let found = normal(&rest, corners);
+            let expected = posed(&rest, corners).axes[2];
+            assert!(norm(sub(found, expected)) < 1e-14, "height 1e-{digits}");
+        }
+    }
+}

@@ -10,7 +10,7 @@ use crate::linalg::dense::columns_mut;
 use crate::linalg::kernels::LANES;
 use crate::linalg::panels::{Eight, Panels, alone, extend_by_rows, subtract_gathered};
 use crate::linalg::reflections::Reflections;
-use crate::linalg::triangle::Triangle;
+use crate::linalg::upper_triangular::UpperTriangular;
 
 /// What a kernel takes, and its part in the side conditions, as products.
 const KERNEL: usize = 40;
@@ -172,7 +172,7 @@ pub(super) fn interpolant<'a>(
         design.side.apply_transpose(panel);
     }
     let beside = part_off(&mut design.sums, design.affine);
-    let factor = Triangle::cholesky(&design.sums)?;
+    let factor = UpperTriangular::cholesky(&design.sums)?;
     Some(Plate::new(l, m, l, coordinates, |b| {
         design.side.apply_transpose(b);
         let mut affine = take(b, design.affine);

@@ -5,16 +5,16 @@ use super::panels::{Eight, Panels, filled, subtract_gathered, subtract_spread};
 
 /// R, upper triangular: its columns in panels of eight, each down to the diagonal.
 #[derive(Clone, Debug, Default)]
-pub struct Triangle {
+pub struct UpperTriangular {
     /// Panel p has 8 p entries above the corner and 8 of the corner, whose entries below the diagonal are not read.
     entries: Vec<Eight>,
     /// 1 / R_ii; for columns that only fill up the last panel what it takes to leave them alone (1), or to make solutions 0 there (0).
     inverses: Vec<Eight>,
 }
 
-impl Triangle {
-    /// R of A = R^T R, with a positive diagonal, for a symmetric positive definite A of as many vectors as entries, of which the lower triangle is read
-    /// (and what shares an eight with it); None where it is not positive definite. O(n^3 / 3).
+impl UpperTriangular {
+    /// R of A = R^T R, with a positive diagonal, for a symmetric positive definite A of as many vectors as entries, of which the lower triangle is read;
+    /// None where it is not positive definite. O(n^3 / 3).
     pub fn cholesky(a: &Panels) -> Option<Self> {
         let mut factor = Self::default();
         let mut above = Vec::with_capacity(a.length());
@@ -162,7 +162,7 @@ mod tests {
                 let a = sign * &a;
                 Panels::of_rows(n, n, |j| a.col(j))
             };
-            let factor = Triangle::cholesky(&panels(1.0)).unwrap();
+            let factor = UpperTriangular::cholesky(&panels(1.0)).unwrap();
             let mut b: Vec<Eight> = (0..n)
                 .map(|i| std::array::from_fn(|lane| (0..n).map(|j| a[(i, j)] * x[j][lane]).sum()))
                 .collect();
@@ -175,7 +175,7 @@ mod tests {
                     "{b:?} {x:?}"
                 );
             }
-            assert_eq!(Triangle::cholesky(&panels(-1.0)).is_some(), n == 0);
+            assert_eq!(UpperTriangular::cholesky(&panels(-1.0)).is_some(), n == 0);
         }
     }
 }
