@@ -97,9 +97,6 @@ impl Verb {
 /// More threads only wait for each other.
 const MOST_THREADS: usize = 1024;
 
-/// Bytes of a thread's stack: as many as a program's first thread has on most systems.
-const STACK: usize = 8 << 20;
-
 /// Frames of a sequence.
 #[derive(Args, Clone)]
 struct FrameChoice {
@@ -184,13 +181,14 @@ pub fn main() -> ExitCode {
         eprintln!("meshseq: --threads {threads}: expected 1 to {MOST_THREADS}");
         return ExitCode::from(2);
     }
+    // This thread is one of the pool: otherwise each piece of parallel work would wait for one of these to wake up. The pool is not made inside of a thread of
+    // its own, since glibc gives back the memory of any thread but the first, and has it cleared again, at every large array.
     // A pool that stands already is the only failure, and then its size stands too.
     let _ = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or_else(default_threads))
-        .stack_size(STACK)
+        .use_current_thread()
         .build_global();
-    // In a thread of the pool: from any other one, each piece of parallel work would wait for one of these to wake up.
-    rayon::scope(|_| conclude(verb.run()))
+    conclude(verb.run())
 }
 
 /// 0, which is rayon's own choice, but for more threads than any machine has use for in its environment variable.
