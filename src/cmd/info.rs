@@ -86,7 +86,7 @@ impl Info {
         ));
         if c.disagreeing_edges > 0 {
             say(&format!(
-                "faces disagree in orientation at {} edges: volumes and inside out mean little",
+                "faces disagree in orientation at {} edges, so volumes mean little",
                 c.disagreeing_edges
             ));
         }

@@ -198,15 +198,14 @@ fn take(entries: &mut [Eight], count: usize) -> [Eight; LANES] {
 /// Puts those of the identity in the place of the first rows and columns of a symmetric matrix, and gives what was to the right of these columns in
 /// these rows, as vectors.
 fn part_off(matrix: &mut Panels, count: usize) -> Vec<Eight> {
-    let mut beside = Vec::new();
-    for panel in matrix.iter_mut() {
-        panel[..count].fill([0.0; LANES]);
-        if beside.is_empty() {
-            beside.extend_from_slice(panel);
-            beside.iter_mut().for_each(|entry| entry[count..].fill(0.0));
-            panel.iter_mut().for_each(|entry| entry[..count].fill(0.0));
-            (0..count).for_each(|i| panel[i][i] = 1.0);
-        }
-    }
+    let columns = matrix.iter_mut().map(|panel| &mut panel[..count]);
+    columns.for_each(|columns| columns.fill([0.0; LANES]));
+    let Some(rows) = matrix.iter_mut().next() else {
+        return Vec::new();
+    };
+    let mut beside = rows.to_vec();
+    beside.iter_mut().for_each(|entry| entry[count..].fill(0.0));
+    rows.iter_mut().for_each(|entry| entry[..count].fill(0.0));
+    (0..count).for_each(|i| rows[i][i] = 1.0);
     beside
 }

@@ -232,13 +232,18 @@ fn corrections(problem: &Problem, projection: &Projection) -> Mat<f64> {
     let Some(sums) = design.sums.iter().next() else {
         return corrections;
     };
-    for ((row, sum), root) in sums.iter().enumerate().zip(&problem.roots) {
-        // z = R^-1 (Q^T kernels); its entries 1 and 2 belong to x and y.
-        let mut z = [[0.0; LANES]; LANES];
-        (0..3).for_each(|i| z[i][0] = sum[i]);
+    let rows = sums.chunks(LANES).zip(problem.roots.chunks(LANES));
+    for (chunk, (sums, roots)) in rows.enumerate() {
+        // z = R^-1 (Q^T kernels) of eight rows; its entries 1 and 2 belong to x and y.
+        let head = |i: usize, row: usize| sums.get(row).filter(|_| i < 3).map_or(0.0, |sum| sum[i]);
+        let mut z = std::array::from_fn::<_, LANES, _>(|i| {
+            std::array::from_fn::<_, LANES, _>(|row| head(i, row))
+        });
         design.side.r().solve(&mut z);
-        corrections[(row, 0)] = root * z[1][0];
-        corrections[(row, 1)] = root * z[2][0];
+        for (row, root) in roots.iter().enumerate() {
+            corrections[(LANES * chunk + row, 0)] = root * z[1][row];
+            corrections[(LANES * chunk + row, 1)] = root * z[2][row];
+        }
     }
     corrections
 }
