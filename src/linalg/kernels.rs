@@ -29,41 +29,43 @@ pub(crate) use vectorised;
 /// Compiles a body whose products are fused with sums (`f64::mul_add`, rounded once) for AVX-512, for AVX2, and for the baseline, where a function call
 /// takes the place of the instruction: slow, but the same bits.
 macro_rules! fused {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<const $p:ident: usize>)? ($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $([$($generics:tt)*])? ($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
         #[inline]
-        $vis fn $name$(<const $p: usize>)?($($arg: $type),*) {
+        $vis fn $name$(<$($generics)*>)?($($arg: $type),*) {
             #[inline(always)]
-            fn body$(<const $p: usize>)?($($arg: $type),*) $body
+            fn body$(<$($generics)*>)?($($arg: $type),*) $body
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-                fn wider$(<const $p: usize>)?($($arg: $type),*) { body$(::<$p>)?($($arg),*) }
+                fn wider$(<$($generics)*>)?($($arg: $type),*) { body($($arg),*) }
                 #[target_feature(enable = "avx2,fma")]
-                fn wide$(<const $p: usize>)?($($arg: $type),*) { body$(::<$p>)?($($arg),*) }
-                if std::arch::is_x86_feature_detected!("fma") {
-                    if $crate::linalg::kernels::has_avx512() {
-                        // SAFETY: the processor has just been seen to have these instructions.
-                        return unsafe { wider$(::<$p>)?($($arg),*) };
-                    }
-                    if std::arch::is_x86_feature_detected!("avx2") {
-                        // SAFETY: as above.
-                        return unsafe { wide$(::<$p>)?($($arg),*) };
-                    }
+                fn wide$(<$($generics)*>)?($($arg: $type),*) { body($($arg),*) }
+                if $crate::linalg::kernels::has_avx512() {
+                    // SAFETY: the processor has just been seen to have these instructions.
+                    return unsafe { wider($($arg),*) };
+                }
+                if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+                    // SAFETY: as above.
+                    return unsafe { wide($($arg),*) };
                 }
             }
-            body$(::<$p>)?($($arg),*)
+            body($($arg),*)
         }
     };
 }
 pub(crate) use fused;
 
 /// Whether the processor has the instructions of AVX-512 that `fused` asks for.
-#[cfg(target_arch = "x86_64")]
-#[inline]
+#[inline(always)]
 pub fn has_avx512() -> bool {
-    use std::arch::is_x86_feature_detected as has;
-    has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl")
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::is_x86_feature_detected as has;
+        has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl") && has!("fma")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    false
 }
 
 /// Marks the upper halves of the vector registers as unused. faer's AVX-512 matrix product (private-gemm-x86 0.1.22) returns without doing so, and every

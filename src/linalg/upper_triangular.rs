@@ -1,14 +1,14 @@
-//! An upper triangular matrix in panels, as a QR or a Cholesky factorisation leaves it, and its solutions for eight vectors at a time.
+//! An upper triangular matrix in panels, as a QR or a Cholesky factorisation leaves it, and its solutions for several vectors at a time.
 
 use super::kernels::{LANES, fused};
-use super::panels::{Eight, Panels, filled, subtract_gathered, subtract_spread};
+use super::panels::{Eight, Entry, Panels, filled, subtract_gathered, subtract_spread};
 
 /// R, upper triangular: its columns in panels of eight, each down to the diagonal.
 #[derive(Clone, Debug, Default)]
 pub struct UpperTriangular {
     /// Panel p has 8 p entries above the corner and 8 of the corner, whose entries below the diagonal are not read.
     entries: Vec<Eight>,
-    /// 1 / R_ii; for columns that only fill up the last panel what it takes to leave them alone (1), or to make solutions 0 there (0).
+    /// 1 / R_ii, and 0 where R_ii is 0.
     inverses: Vec<Eight>,
 }
 
@@ -16,7 +16,11 @@ impl UpperTriangular {
     /// R of A = R^T R, with a positive diagonal, for a symmetric positive definite A of as many vectors as entries, of which the lower triangle is read;
     /// None where it is not positive definite. O(n^3 / 3).
     pub fn cholesky(a: &Panels) -> Option<Self> {
-        let mut factor = Self::default();
+        let panels = a.vectors().div_ceil(LANES);
+        let mut factor = Self {
+            entries: Vec::with_capacity(start(panels)),
+            inverses: Vec::with_capacity(panels),
+        };
         let mut above = Vec::with_capacity(a.length());
         for (first, panel) in (0..a.vectors()).step_by(LANES).zip(a.iter()) {
             above.clear();
@@ -24,17 +28,18 @@ impl UpperTriangular {
             factor.solve_transposed(&mut above);
             let mut rest = bordered(&panel[first..]);
             subtract_gathered(&above, &above, &mut rest);
-            let (corner, inverses) = corner_factor(&rest)?;
-            factor.push(&above, &corner, inverses);
+            factor.push(&above, &corner_factor(&rest)?);
         }
         Some(factor)
     }
 
-    /// Adds eight columns: what is above the corner, the corner, and the inverses of its diagonal.
-    pub fn push(&mut self, above: &[Eight], corner: &[Eight; LANES], inverses: Eight) {
+    /// Adds eight columns: what is above the corner, and the corner. Where its diagonal is 0, so will be the solutions.
+    pub fn push(&mut self, above: &[Eight], corner: &[Eight; LANES]) {
+        let inverse = |d: f64| if d == 0.0 { 0.0 } else { 1.0 / d };
+        self.inverses
+            .push(Entry(std::array::from_fn(|i| inverse(corner[i][i]))));
         self.entries.extend_from_slice(above);
         self.entries.extend_from_slice(corner);
-        self.inverses.push(inverses);
     }
 
     /// The number of panels.
@@ -44,13 +49,13 @@ impl UpperTriangular {
 
     /// Above the corner of a panel, and the corner.
     fn panel(&self, p: usize) -> (&[Eight], &[Eight; LANES]) {
-        let first = LANES * (p * (p + 1) / 2);
+        let first = start(p);
         let (above, rest) = self.entries[first..].split_at(LANES * p);
         (above, rest.first_chunk().expect("a panel has a corner"))
     }
 
-    /// Replaces eight vectors b, entry by entry, by R^-1 b: as many entries as R has columns, in whole eights.
-    pub fn solve(&self, b: &mut [Eight]) {
+    /// Replaces L vectors b, entry by entry, by R^-1 b: as many entries as R has columns, in whole eights.
+    pub fn solve<const L: usize>(&self, b: &mut [Entry<L>]) {
         for p in (0..self.count()).rev() {
             let (above, corner) = self.panel(p);
             let (head, x) = part(b, p);
@@ -59,8 +64,8 @@ impl UpperTriangular {
         }
     }
 
-    /// Replaces eight vectors b, entry by entry, by R^-T b.
-    pub fn solve_transposed(&self, b: &mut [Eight]) {
+    /// Replaces L vectors b, entry by entry, by R^-T b.
+    pub fn solve_transposed<const L: usize>(&self, b: &mut [Entry<L>]) {
         for p in 0..self.count() {
             let (above, corner) = self.panel(p);
             let (head, x) = part(b, p);
@@ -70,8 +75,13 @@ impl UpperTriangular {
     }
 }
 
+/// The entries of panels before panel p.
+fn start(p: usize) -> usize {
+    LANES * (p * (p + 1) / 2)
+}
+
 /// The entries before those of a panel, and its own.
-fn part(b: &mut [Eight], p: usize) -> (&mut [Eight], &mut [Eight; LANES]) {
+fn part<const L: usize>(b: &mut [Entry<L>], p: usize) -> (&mut [Entry<L>], &mut [Entry<L>; LANES]) {
     let (head, rest) = b.split_at_mut(LANES * p);
     (head, rest.first_chunk_mut().expect("eight entries a panel"))
 }
@@ -86,12 +96,12 @@ fn bordered(corner: &[Eight]) -> [Eight; LANES] {
     eight
 }
 
-/// R with A = R^T R for eight columns of a symmetric matrix, and the inverses of its diagonal.
-fn corner_factor(a: &[Eight; LANES]) -> Option<([Eight; LANES], Eight)> {
-    let (mut r, mut inverses) = (*a, [0.0; LANES]);
+/// R with A = R^T R for eight columns of a symmetric matrix.
+fn corner_factor(a: &[Eight; LANES]) -> Option<[Eight; LANES]> {
+    let mut r = *a;
     for i in 0..LANES {
         // What the rows above have left of row i, which by symmetry is column i of A from the diagonal on.
-        let mut row: Eight = std::array::from_fn(|j| a[i.min(j)][i.max(j)]);
+        let mut row: [f64; LANES] = std::array::from_fn(|j| a[i.min(j)][i.max(j)]);
         for above in &r[..i] {
             for j in i..LANES {
                 row[j] -= above[i] * above[j];
@@ -101,42 +111,50 @@ fn corner_factor(a: &[Eight; LANES]) -> Option<([Eight; LANES], Eight)> {
             return None;
         }
         let root = row[i].sqrt();
-        inverses[i] = 1.0 / root;
-        r[i] = row.map(|x| x / root);
+        r[i] = Entry(row.map(|x| x / root));
         r[i][i] = root;
     }
-    Some((r, inverses))
+    Some(r)
 }
 
 fused! {
-    fn solve_corner(corner: &[Eight; LANES], inverses: &Eight, x: &mut [Eight; LANES]) {
-        let mut own = *x;
-        for i in (0..LANES).rev() {
-            let mut sum = own[i];
-            for j in i + 1..LANES {
-                for lane in 0..LANES {
-                    sum[lane] = (-corner[i][j]).mul_add(own[j][lane], sum[lane]);
+    fn solve_corner[const L: usize](corner: &[Eight; LANES], inverses: &Eight, x: &mut [Entry<L>; LANES]) {
+        for first in (0..L).step_by(LANES) {
+            let mut own: [[f64; LANES]; LANES] = std::array::from_fn(|i| std::array::from_fn(|lane| x[i][first + lane]));
+            for i in (0..LANES).rev() {
+                let mut sum = own[i];
+                // The latest last: the others need not wait for it.
+                for j in (i + 1..LANES).rev() {
+                    for lane in 0..LANES {
+                        sum[lane] = (-corner[i][j]).mul_add(own[j][lane], sum[lane]);
+                    }
                 }
+                own[i] = sum.map(|x| x * inverses[i]);
             }
-            own[i] = sum.map(|x| x * inverses[i]);
+            for (x, own) in x.iter_mut().zip(&own) {
+                x[first..first + LANES].copy_from_slice(own);
+            }
         }
-        *x = own;
     }
 }
 
 fused! {
-    fn solve_corner_transposed(corner: &[Eight; LANES], inverses: &Eight, x: &mut [Eight; LANES]) {
-        let mut own = *x;
-        for i in 0..LANES {
-            let mut sum = own[i];
-            for j in 0..i {
-                for lane in 0..LANES {
-                    sum[lane] = (-corner[j][i]).mul_add(own[j][lane], sum[lane]);
+    fn solve_corner_transposed[const L: usize](corner: &[Eight; LANES], inverses: &Eight, x: &mut [Entry<L>; LANES]) {
+        for first in (0..L).step_by(LANES) {
+            let mut own: [[f64; LANES]; LANES] = std::array::from_fn(|i| std::array::from_fn(|lane| x[i][first + lane]));
+            for i in 0..LANES {
+                let mut sum = own[i];
+                for j in 0..i {
+                    for lane in 0..LANES {
+                        sum[lane] = (-corner[j][i]).mul_add(own[j][lane], sum[lane]);
+                    }
                 }
+                own[i] = sum.map(|x| x * inverses[i]);
             }
-            own[i] = sum.map(|x| x * inverses[i]);
+            for (x, own) in x.iter_mut().zip(&own) {
+                x[first..first + LANES].copy_from_slice(own);
+            }
         }
-        *x = own;
     }
 }
 
@@ -150,7 +168,7 @@ mod tests {
     fn system(n: usize) -> (Mat<f64>, Vec<Eight>) {
         let root = Mat::from_fn(n + 3, n, |i, j| ((i + 2) as f64 * (j as f64 + 0.7)).sin());
         let x = |i: usize, lane: usize| ((3 * i + 5 * lane) as f64).cos();
-        let x = (0..n).map(|i| std::array::from_fn(|lane| x(i, lane)));
+        let x = (0..n).map(|i| Entry(std::array::from_fn(|lane| x(i, lane))));
         (root.transpose() * &root, x.collect())
     }
 
@@ -164,14 +182,17 @@ mod tests {
             };
             let factor = UpperTriangular::cholesky(&panels(1.0)).unwrap();
             let mut b: Vec<Eight> = (0..n)
-                .map(|i| std::array::from_fn(|lane| (0..n).map(|j| a[(i, j)] * x[j][lane]).sum()))
+                .map(|i| {
+                    let product = |lane: usize| (0..n).map(|j| a[(i, j)] * x[j][lane]).sum();
+                    Entry(std::array::from_fn(product))
+                })
                 .collect();
-            b.resize(n.next_multiple_of(LANES), [0.0; LANES]);
+            b.resize(n.next_multiple_of(LANES), Entry::ZERO);
             factor.solve_transposed(&mut b);
             factor.solve(&mut b);
             for (b, x) in b.iter().zip(&x) {
                 assert!(
-                    b.iter().zip(x).all(|(b, x)| (b - x).abs() < 1e-6),
+                    b.iter().zip(x.iter()).all(|(b, x)| (b - x).abs() < 1e-6),
                     "{b:?} {x:?}"
                 );
             }

@@ -6,10 +6,10 @@ use thiserror::Error;
 
 use super::Point;
 use super::thin_plate::{Frame, eight_points, kernels, kernels_of_eight};
-use super::thin_plate_fit::{Design, interpolant, least_squares};
+use super::thin_plate_fit::{Design, ROWS, interpolant, least_squares};
 use crate::linalg::dense::columns_mut;
 use crate::linalg::kernels::{LANES, combine_fused};
-use crate::linalg::panels::{Eight, Panels, alone};
+use crate::linalg::panels::{Eight, Entry, Panels, alone};
 
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;
@@ -61,8 +61,8 @@ impl PoseSignal {
         let at = |i: usize| coordinates.col(i);
         let m = coordinates.nrows();
         let through = (sites.len() == points.len())
-            .then(|| Design::new(&normalised, frame.affine, &normalised))
-            .and_then(|design| interpolant(design, m, |j| at(sites[j])));
+            .then(|| interpolant(&normalised, frame.affine, m, |j| at(sites[j])))
+            .flatten();
         let plate = through.unwrap_or_else(|| {
             let queries: Vec<Point> = points.iter().map(|&p| frame.normalise(p)).collect();
             let design = Design::new(&normalised, frame.affine, &queries);
@@ -94,13 +94,14 @@ impl PoseSignal {
         let m = self.coefficients.nrows();
         let mut values = Mat::zeros(m, points.len());
         if m > 0 {
-            let panels = Panels::of_rows(m, self.sites.len() + 3, |j| self.coefficients.col(j));
+            let panels =
+                Panels::<ROWS>::of_rows(m, self.sites.len() + 3, |j| self.coefficients.col(j));
             values
                 .par_col_chunks_mut(LANES)
                 .zip(points.par_chunks(LANES))
                 .with_min_len(alone(LANES * m * panels.length()))
                 .for_each_init(
-                    || vec![[1.0; LANES]; panels.length()],
+                    || vec![Entry([1.0; LANES]); panels.length()],
                     |weights, (values, points)| {
                         self.weights(points, weights);
                         panels.products(weights, &mut columns_mut(values));

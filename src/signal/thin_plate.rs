@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::Point;
 use crate::linalg::kernels::{LANES, fused, one_at_a_time};
-use crate::linalg::panels::Eight;
+use crate::linalg::panels::{Eight, Entry};
 
 /// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches and with products fused with
 /// sums, so that a loop over it becomes vector instructions, and with the same bits on every machine.
@@ -30,7 +30,9 @@ fn ln(x: f64) -> f64 {
         .mul_add(w, 2.857_142_874_366_239e-1)
         .mul_add(w, 6.666_666_666_666_735e-1);
     let rest = even.mul_add(w, odd.mul_add(z, half));
-    k.mul_add(LN2[0], f - (half - s.mul_add(rest, k * LN2[1])))
+    // The first two do not wait for the quotient.
+    let (high, low) = (k.mul_add(LN2[0], f), k.mul_add(LN2[1], -half));
+    high + s.mul_add(rest, low)
 }
 
 /// phi(r) = r^2 ln r as a function of r^2, with phi(0) = 0 (reading 4).
@@ -59,7 +61,8 @@ pub type EightPoints = [Eight; 2];
 /// Up to eight points, the last of them as often as it takes to fill the eight.
 pub fn eight_points(points: &[Point]) -> EightPoints {
     let last = points.len().saturating_sub(1);
-    [0, 1].map(|axis| std::array::from_fn(|i| points.get(i.min(last)).map_or(0.0, |p| p[axis])))
+    let along = |axis: usize| move |i: usize| points.get(i.min(last)).map_or(0.0, |p| p[axis]);
+    [0, 1].map(|axis| Entry(std::array::from_fn(along(axis))))
 }
 
 fused! {
@@ -73,7 +76,7 @@ fused! {
                 value[lane] = x.mul_add(x, y * y);
             }
         }
-        for value in values.as_flattened_mut() {
+        for value in Entry::flattened(values) {
             *value = kernel(*value);
         }
     }

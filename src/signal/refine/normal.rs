@@ -6,6 +6,7 @@ use super::projection::{Problem, Projection, Unknowns, scale_rows};
 use crate::linalg::banded::BAND;
 use crate::linalg::dense::{Cholesky, multiply};
 use crate::linalg::kernels::LANES;
+use crate::linalg::panels::{Eight, Entry};
 use crate::signal::basis::Local;
 use crate::signal::thin_plate::kernel_gradients;
 
@@ -151,8 +152,13 @@ impl Moves {
     fn new(problem: &Problem, projection: &Projection, gradients: MatRef<'_, f64>) -> Self {
         let coefficients = projection.coefficients();
         let plate = projection.design.plate(coefficients.as_ref());
-        let weights = plate.weights.transposed().rows_matrix();
-        let (count, l) = (gradients.nrows(), weights.nrows());
+        let (count, l) = (gradients.nrows(), gradients.ncols() / 2);
+        let weights = plate
+            .weights
+            .rows_matrix()
+            .get(.., ..l)
+            .transpose()
+            .to_owned();
         let slopes = [0, 1].map(|axis| {
             let kernels = gradients.get(.., axis * l..(axis + 1) * l);
             let mut slope = product(kernels, weights.as_ref());
@@ -236,10 +242,9 @@ fn corrections(problem: &Problem, projection: &Projection) -> Mat<f64> {
     for (chunk, (sums, roots)) in rows.enumerate() {
         // z = R^-1 (Q^T kernels) of eight rows; its entries 1 and 2 belong to x and y.
         let head = |i: usize, row: usize| sums.get(row).filter(|_| i < 3).map_or(0.0, |sum| sum[i]);
-        let mut z = std::array::from_fn::<_, LANES, _>(|i| {
-            std::array::from_fn::<_, LANES, _>(|row| head(i, row))
-        });
-        design.side.r().solve(&mut z);
+        let mut z: [Eight; LANES] =
+            std::array::from_fn(|i| Entry(std::array::from_fn(|row| head(i, row))));
+        design.side.r.solve(&mut z);
         for (row, root) in roots.iter().enumerate() {
             corrections[(LANES * chunk + row, 0)] = root * z[1][row];
             corrections[(LANES * chunk + row, 1)] = root * z[2][row];

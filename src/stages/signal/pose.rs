@@ -74,18 +74,21 @@ pub fn rbf(inputs: &Bundle) -> Result<Box<dyn Call>, StageError> {
     let sites = inputs.indices("sites")?;
     let query = inputs.points("query")?;
     same_count("P", points.len(), x.ncols())?;
+    let n = points.len();
+    let asked = [&points[..], &query].concat();
     call(
         move || {
             let pose = PoseSignal::fit(&points, x.as_ref(), &sites);
             let pose = pose.map_err(StageError::from_error)?;
-            let values = [pose.evaluate(&points), pose.evaluate(&query)];
+            let values = pose.evaluate(&asked);
             Ok((pose, values))
         },
-        |(pose, [values, query_values])| {
+        move |(pose, values)| {
+            let (values, query_values) = values.split_at_col(n);
             Bundle::from([
                 ("g", Array::columns(pose.coefficients.as_ref())),
-                ("values", Array::columns(values.as_ref())),
-                ("query_values", Array::columns(query_values.as_ref())),
+                ("values", Array::columns(values)),
+                ("query_values", Array::columns(query_values)),
             ])
         },
     )
