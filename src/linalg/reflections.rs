@@ -1,8 +1,10 @@
 //! A QR factorisation by Householder's reflections, eight columns at a time in panels (Schreiber & Van Loan 1989): for matrices that fit in a cache, where it
 //! takes half of the time of faer's.
 
+use super::entry::{Eight, Entry};
 use super::kernels::{LANES, fused, total};
-use super::panels::{Eight, Entry, Panels, gather, subtract_gathered, subtract_spread};
+use super::panels::Panels;
+use super::tiles::{gather, subtract_gathered, subtract_spread};
 use super::upper_triangular::UpperTriangular;
 
 /// A = Q R for a matrix A with at least as many rows as columns.

@@ -1,7 +1,9 @@
 //! An upper triangular matrix in panels, as a QR or a Cholesky factorisation leaves it, and its solutions for several vectors at a time.
 
+use super::entry::{Eight, Entry, filled};
 use super::kernels::{LANES, fused};
-use super::panels::{Eight, Entry, Panels, filled, subtract_gathered, subtract_spread};
+use super::panels::Panels;
+use super::tiles::{subtract_gathered, subtract_spread};
 
 /// R, upper triangular: its columns in panels of eight, each down to the diagonal.
 #[derive(Clone, Debug, Default)]

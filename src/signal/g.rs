@@ -8,8 +8,9 @@ use super::Point;
 use super::thin_plate::{Frame, eight_points, kernels, kernels_of_eight};
 use super::thin_plate_fit::{Design, ROWS, interpolant, least_squares};
 use crate::linalg::dense::columns_mut;
+use crate::linalg::entry::{Eight, Entry};
 use crate::linalg::kernels::{LANES, combine_fused};
-use crate::linalg::panels::{Eight, Entry, Panels, alone};
+use crate::linalg::panels::{Panels, alone};
 
 /// Sites closer than this share of their extent coincide.
 const COINCIDENT: f64 = 1e-13;

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::Point;
+use crate::linalg::entry::{Eight, Entry};
 use crate::linalg::kernels::{LANES, fused, one_at_a_time};
-use crate::linalg::panels::{Eight, Entry};
 
 /// ln x for a normal positive x, to less than one unit in the last place: fdlibm's reduction and polynomial, without branches and with products fused with
 /// sums, so that a loop over it becomes vector instructions, and with the same bits on every machine.

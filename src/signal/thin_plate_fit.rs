@@ -7,9 +7,11 @@ use rayon::prelude::*;
 use super::Point;
 use super::thin_plate::{EightPoints, Frame, eight_points, kernels_of_eight};
 use crate::linalg::dense::columns_mut;
+use crate::linalg::entry::{Eight, Entry};
 use crate::linalg::kernels::LANES;
-use crate::linalg::panels::{Eight, Entry, Panels, alone, subtract_gathered};
+use crate::linalg::panels::{Panels, alone};
 use crate::linalg::reflections::{BlockReflection, Reflections};
+use crate::linalg::tiles::subtract_gathered;
 use crate::linalg::upper_triangular::UpperTriangular;
 
 /// What a kernel takes, and its part in the side conditions, as products.

@@ -5,8 +5,8 @@ use faer::{Accum, Mat, MatRef};
 use super::projection::{Problem, Projection, Unknowns, scale_rows};
 use crate::linalg::banded::BAND;
 use crate::linalg::dense::{Cholesky, multiply};
+use crate::linalg::entry::{Eight, Entry};
 use crate::linalg::kernels::LANES;
-use crate::linalg::panels::{Eight, Entry};
 use crate::signal::basis::Local;
 use crate::signal::thin_plate::kernel_gradients;
 
