@@ -44,6 +44,6 @@ impl<const L: usize> Borrow<[f64; L]> for Entry<L> {
 }
 
 /// The first eight entries, filled up with zeros.
-pub fn filled<const L: usize>(entries: &[Entry<L>]) -> [Entry<L>; LANES] {
+pub fn filled(entries: &[Eight]) -> [Eight; LANES] {
     std::array::from_fn(|i| entries.get(i).copied().unwrap_or(Entry::ZERO))
 }

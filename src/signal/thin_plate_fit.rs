@@ -47,7 +47,11 @@ impl Design {
     /// O(l points) kernels.
     pub fn new(sites: &[Point], affine: usize, points: &[Point]) -> Self {
         let side = Side::new(sites, affine);
-        let sums = kernels(sites, points, |panel| side.q.apply_transpose(panel)).transposed();
+        let kernels = each_panel(sites, points, |_, points, panel| {
+            kernels_of_eight(points, sites, panel);
+            side.q.apply_transpose(panel);
+        });
+        let sums = kernels.transposed();
         Self { side, sums, affine }
     }
 
@@ -183,14 +187,6 @@ pub(super) fn interpolant<'a>(
         q.apply(&mut b[..l]);
         head
     }))
-}
-
-/// The kernels of the sites, a vector a point, and what is to become of each panel of them.
-fn kernels(sites: &[Point], points: &[Point], change: impl Fn(&mut [Eight]) + Sync) -> Panels {
-    each_panel(sites, points, |_, points, panel| {
-        kernels_of_eight(points, sites, panel);
-        change(panel);
-    })
 }
 
 /// The symmetric kernels of sites among themselves.
