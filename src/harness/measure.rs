@@ -14,7 +14,7 @@ const SAMPLE_SECONDS: f64 = 2e-3;
 const MOST_BATCH: f64 = 2000.0;
 /// All rounds of one engine on one case last about this long.
 const BUDGET_SECONDS: f64 = 2.0;
-const ROUNDS: (usize, usize) = (3, 25);
+const ROUNDS: (usize, usize) = (5, 25);
 /// An engine whose call takes longer has one sample, from before the first round.
 const SLOW_SECONDS: f64 = 4.0;
 

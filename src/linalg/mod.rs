@@ -7,6 +7,7 @@ pub mod compressed;
 pub mod dense;
 pub mod elimination;
 pub mod entry;
+pub mod gram;
 pub mod kernels;
 pub mod panels;
 pub mod pca;

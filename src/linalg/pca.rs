@@ -1,17 +1,17 @@
 //! Principal components of many numbers in few samples: the route that costs one product of the data with itself.
 
-use faer::linalg::matmul::triangular;
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef, Par, Scale};
+use faer::{Accum, ColRef, Mat, MatMut, MatRef, Scale};
 use rayon::prelude::*;
 
-use super::dense::{FactorError, Qr, multiply, symmetric_eigen, thin_svd};
-use super::kernels::{axpy, clear_upper_halves, max_abs, norm_squared, subtract};
+use super::dense::{FactorError, Qr, SymmetricEigen, multiply, symmetric_eigen, thin_svd};
+use super::gram::Gram;
+use super::kernels::{axpy, max_abs, norm_squared, subtract};
 
-/// Rows of the data handled at a time; n columns of this many numbers stay in cache.
-const BLOCK: usize = 1024;
+/// Rows of the data handled at a time; n columns of this many numbers stay in cache. Not a power of two: columns a page apart meet in the same lines of it.
+const BLOCK: usize = 504;
 /// Partial Gram matrices, added up in a fixed order: the result does not depend on the number of threads.
-const PARTS: usize = 8;
+const PARTS: usize = 16;
 /// Squared ratio of the last kept singular value to the first, below which the Householder route is taken: squaring the data costs the basis
 /// up to eps over this ratio of its orthonormality, 2e-10 at worst.
 const GRAM_LIMIT: f64 = 1e-6;
@@ -45,10 +45,23 @@ pub fn pca(samples: MatRef<'_, f64>, m: usize) -> Result<Pca, FactorError> {
     }
     // One core touches the memory of the basis while the other multiplies.
     let (basis, (gram, mean)) = rayon::join(|| Mat::zeros(d, m), || gram(samples));
-    match by_gram(samples, &mean, gram.as_ref(), basis)? {
-        Some(pca) => Ok(pca),
-        None => by_qr(samples, mean, m),
+    let eigen = symmetric_eigen(gram.as_ref())?;
+    if squaring_is_safe(samples, &mean, &eigen, m) {
+        Ok(by_gram(samples, mean, &eigen, basis))
+    } else {
+        by_qr(samples, mean, m)
     }
+}
+
+/// Whether the first m singular values, from the eigenvalues of the Gram matrix, are far enough above what squaring the data leaves of small ones.
+fn squaring_is_safe(
+    samples: MatRef<'_, f64>,
+    mean: &[f64],
+    eigen: &SymmetricEigen,
+    m: usize,
+) -> bool {
+    let negligible = negligible(samples, mean, eigen.values.iter().copied());
+    eigen.values[m - 1] > (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible)
 }
 
 /// What a singular value must exceed to count, from the squares of all of them: ||samples||_F^2 is their sum and n |mean|^2.
@@ -116,80 +129,75 @@ fn gram(samples: MatRef<'_, f64>) -> (Mat<f64>, Vec<f64>) {
     let (d, n) = samples.shape();
     let mut mean = vec![0.0; d];
     let rows = BLOCK * d.div_ceil(BLOCK).div_ceil(PARTS).max(1);
-    let parts: Vec<Mat<f64>> = mean
+    let sum_of_part = |buffer: &mut Mat<f64>, (part, means): (usize, &mut [f64])| {
+        let mut sum = Gram::zeros(n);
+        for (block, mean) in means.chunks_mut(BLOCK).enumerate() {
+            let samples = samples.subrows(part * rows + block * BLOCK, mean.len());
+            mean_rows(samples, mean);
+            let mut centred = buffer.get_mut(..mean.len(), ..);
+            centred_rows(samples, mean, 0, centred.rb_mut());
+            sum.add(centred.rb());
+        }
+        sum
+    };
+    let parts: Vec<Gram> = mean
         .par_chunks_mut(rows)
         .enumerate()
-        .map(|(part, means)| {
-            let mut sum = Mat::zeros(n, n);
-            let mut buffer = Mat::zeros(BLOCK, n);
-            for (block, mean) in means.chunks_mut(BLOCK).enumerate() {
-                let samples = samples.subrows(part * rows + block * BLOCK, mean.len());
-                mean_rows(samples, mean);
-                let mut centred = buffer.get_mut(..mean.len(), ..);
-                centred_rows(samples, mean, 0, centred.rb_mut());
-                triangular::matmul(
-                    sum.as_mut(),
-                    triangular::BlockStructure::TriangularLower,
-                    Accum::Add,
-                    centred.rb().transpose(),
-                    triangular::BlockStructure::Rectangular,
-                    centred.rb(),
-                    triangular::BlockStructure::Rectangular,
-                    1.0,
-                    Par::Seq,
-                );
-                clear_upper_halves();
-            }
-            sum
-        })
+        .map_init(|| Mat::zeros(BLOCK, n), sum_of_part)
         .collect();
-    let sum = parts.into_iter().reduce(|sum, part| sum + part);
-    (sum.unwrap_or_else(|| Mat::zeros(n, n)), mean)
+    let sum = parts.into_iter().reduce(Gram::plus);
+    (sum.unwrap_or_else(|| Gram::zeros(n)).lower(), mean)
 }
 
-/// The Gram route, or None where the kept singular values spread too far for it. `basis` is d x m, and overwritten.
+/// The Gram route: Y^T Y = V S^2 V^T gives the basis Y V S^-1. `basis` is d x m, and overwritten.
 fn by_gram(
     samples: MatRef<'_, f64>,
-    mean: &[f64],
-    gram: MatRef<'_, f64>,
+    mean: Vec<f64>,
+    eigen: &SymmetricEigen,
     mut basis: Mat<f64>,
-) -> Result<Option<Pca>, FactorError> {
+) -> Pca {
     let (n, m) = (samples.ncols(), basis.ncols());
-    let eigen = symmetric_eigen(gram)?;
-    let negligible = negligible(samples, mean, eigen.values.iter().copied());
-    let least = (GRAM_LIMIT * eigen.values[0]).max(negligible * negligible);
-    if eigen.values[m - 1] <= least {
-        return Ok(None);
-    }
     let sigma: Vec<f64> = eigen.values.iter().map(|v| v.max(0.0).sqrt()).collect();
     let weights = Mat::from_fn(n, m, |i, j| eigen.vectors[(i, j)] / sigma[j]);
-    centred_product(samples, mean, weights.as_ref(), basis.as_mut());
-    let signs = orient(&mut basis);
-    let coordinates = Mat::from_fn(m, n, |j, i| signs[j] * sigma[j] * eigen.vectors[(i, j)]);
-    Ok(Some(Pca {
-        mean: mean.to_vec(),
+    let peaks = centred_product(samples, &mean, weights.as_ref(), basis.as_mut());
+    let signs = turn(&mut basis, &peaks);
+    Pca {
+        mean,
         basis,
-        coordinates,
+        coordinates: Mat::from_fn(m, n, |j, i| signs[j] * sigma[j] * eigen.vectors[(i, j)]),
         singular_values: sigma,
-    }))
+    }
 }
 
-/// Y W for the centred samples Y (d x n) and W (n x m), a block of rows at a time.
+/// Y W for the centred samples Y (d x n) and W (n x m), a block of rows at a time, and the peaks of each block.
 fn centred_product(
     samples: MatRef<'_, f64>,
     mean: &[f64],
     w: MatRef<'_, f64>,
     product: MatMut<'_, f64>,
-) {
+) -> Vec<Vec<f64>> {
     let n = samples.ncols();
-    product.par_row_chunks_mut(BLOCK).enumerate().for_each_init(
-        || Mat::zeros(BLOCK, n),
-        |buffer, (block, target)| {
+    let blocks = product.par_row_chunks_mut(BLOCK).enumerate();
+    let product_of_block =
+        |buffer: &mut Mat<f64>, (block, mut target): (usize, MatMut<'_, f64>)| {
             let mut rows = buffer.get_mut(..target.nrows(), ..);
             centred_rows(samples, mean, block * BLOCK, rows.rb_mut());
-            multiply(target, Accum::Replace, rows.rb(), w);
-        },
-    );
+            multiply(target.rb_mut(), Accum::Replace, rows.rb(), w);
+            peaks(target.rb())
+        };
+    blocks
+        .map_init(|| Mat::zeros(BLOCK, n), product_of_block)
+        .collect()
+}
+
+/// The greatest magnitude in each column of a block of rows.
+fn peaks(block: MatRef<'_, f64>) -> Vec<f64> {
+    let columns = block.col_iter();
+    let peak = |column: ColRef<'_, f64>| match column.try_as_col_major() {
+        Some(column) => max_abs(column.as_slice()),
+        None => column.norm_max(),
+    };
+    columns.map(peak).collect()
 }
 
 /// The Householder route: Y = Q R and R = U S V^T give Y = (Q U) S V^T.
@@ -223,17 +231,23 @@ fn by_qr(samples: MatRef<'_, f64>, mean: Vec<f64>, m: usize) -> Result<Pca, Fact
 
 /// Turns each column so that its entry of largest magnitude (the first of equals) is positive; returns the signs applied.
 pub(crate) fn orient(basis: &mut Mat<f64>) -> Vec<f64> {
+    let blocks = basis.par_row_chunks(BLOCK);
+    let peaks: Vec<Vec<f64>> = blocks.map(peaks).collect();
+    turn(basis, &peaks)
+}
+
+/// [`orient`], from the peaks of each block of rows.
+fn turn(basis: &mut Mat<f64>, peaks: &[Vec<f64>]) -> Vec<f64> {
     let sign = |j: usize| {
-        let column = basis.col_as_slice(j);
-        let most = max_abs(column);
-        let largest = column.iter().find(|x| x.abs() == most);
-        if largest.is_some_and(|&x| x < 0.0) {
-            -1.0
-        } else {
-            1.0
+        let most = peaks.iter().map(|peaks| peaks[j]).fold(0.0, f64::max);
+        let block = peaks.iter().position(|peaks| peaks[j] == most);
+        let rows = &basis.col_as_slice(j)[block.unwrap_or(0) * BLOCK..];
+        match rows.iter().find(|x| x.abs() == most) {
+            Some(&x) if x < 0.0 => -1.0,
+            _ => 1.0,
         }
     };
-    let signs: Vec<f64> = (0..basis.ncols()).into_par_iter().map(sign).collect();
+    let signs: Vec<f64> = (0..basis.ncols()).map(sign).collect();
     let columns = basis.par_col_iter_mut().zip(&signs);
     columns.for_each(|(mut column, &sign)| {
         if sign < 0.0 {
@@ -259,11 +273,29 @@ mod tests {
         let whole = pca(samples.as_ref(), 8).unwrap();
         assert!(residual(&samples, &whole) < 1e-12 * samples.norm_l2());
         let (gram, mean) = gram(samples.as_ref());
-        let gram = by_gram(samples.as_ref(), &mean, gram.as_ref(), Mat::zeros(700, 4));
-        let gram = gram.unwrap().unwrap();
+        let eigen = symmetric_eigen(gram.as_ref()).unwrap();
+        assert!(squaring_is_safe(samples.as_ref(), &mean, &eigen, 4));
+        let gram = by_gram(samples.as_ref(), mean.clone(), &eigen, Mat::zeros(700, 4));
         let qr = by_qr(samples.as_ref(), mean, 4).unwrap();
         assert!((&gram.basis - &qr.basis).norm_max() < 1e-12);
         assert!((&gram.coordinates - &qr.coordinates).norm_max() < 1e-12 * samples.norm_l2());
+    }
+
+    #[test]
+    fn columns_turn_by_the_first_of_their_greatest_entries() {
+        let mut basis = Mat::from_fn(2 * BLOCK + 3, 3, |i, j| 0.1 * ((i * j) as f64).sin());
+        basis[(BLOCK + 7, 0)] = -2.0;
+        basis[(BLOCK - 1, 1)] = 2.0;
+        basis[(2 * BLOCK + 1, 1)] = -2.0;
+        basis[(5, 2)] = -2.0;
+        basis[(2 * BLOCK + 2, 2)] = 2.0;
+        let before = basis.clone();
+        let signs = orient(&mut basis);
+        assert_eq!(signs, [-1.0, 1.0, -1.0]);
+        assert_eq!(
+            basis,
+            Mat::from_fn(before.nrows(), 3, |i, j| signs[j] * before[(i, j)])
+        );
     }
 
     #[test]
