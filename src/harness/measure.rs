@@ -14,12 +14,15 @@ const SAMPLE_SECONDS: f64 = 2e-3;
 const MOST_BATCH: f64 = 2000.0;
 /// All rounds of one engine on one case last about this long.
 const BUDGET_SECONDS: f64 = 2.0;
-const ROUNDS: (usize, usize) = (5, 25);
+const ROUNDS: (usize, usize) = (5, 15);
+/// Calls before a sample last about this long, where one takes less. Threads of the engine before, OpenBLAS's above all, look for more work for 35 ms after
+/// their last call, and the scheduler leaves two threads that wake up together on one core for up to 50 ms while the other idles.
+const WARM_UP_SECONDS: f64 = 0.1;
 /// An engine whose call takes longer has one sample, from before the first round.
 const SLOW_SECONDS: f64 = 4.0;
 
-/// Times the engines of these places in the list (those that agree) on a case. Every round asks each once; each answers after a warm-up call where that
-/// is cheap.
+/// Times the engines of these places in the list (those that agree) on a case. Every round asks each once; each answers after warm-up calls where these
+/// are cheap.
 pub fn measure(
     case: &Case,
     inputs: &Bundle,
@@ -29,19 +32,24 @@ pub fn measure(
     let Some(stage) = stages::find(case.stage) else {
         return (Vec::new(), Vec::new());
     };
-    let timed = |engine: &mut dyn Engine, batch: usize, warm: bool| {
-        ask(engine, stage, inputs, case.timeout, batch, warm)
+    let timed = |engine: &mut dyn Engine, batch: usize, before: usize| {
+        ask(engine, stage, inputs, case.timeout, batch, before)
     };
     let mut runs: Vec<Run> = Vec::new();
     for &place in places {
         let engine = engines[place].as_mut();
         // The first call warms up; the second says how long one takes.
-        if let Some(seconds) = timed(engine, 1, true) {
+        if let Some(seconds) = timed(engine, 1, 1) {
             let batch = (SAMPLE_SECONDS / seconds).clamp(1.0, MOST_BATCH).ceil() as usize;
+            let before = WARM_UP_SECONDS / (seconds * batch as f64);
             runs.push(Run {
                 place,
                 batch,
-                warm: seconds < 0.1,
+                before: if before > 1.0 {
+                    before.ceil() as usize
+                } else {
+                    0
+                },
                 pilot: seconds,
                 seconds: Vec::from_iter((seconds > SLOW_SECONDS).then_some(seconds)),
             });
@@ -59,7 +67,7 @@ pub fn measure(
             if run.slow() {
                 return true;
             }
-            let seconds = timed(engines[run.place].as_mut(), run.batch, run.warm);
+            let seconds = timed(engines[run.place].as_mut(), run.batch, run.before);
             run.seconds.extend(seconds);
             seconds.is_some()
         });
@@ -70,7 +78,8 @@ pub fn measure(
 struct Run {
     place: usize,
     batch: usize,
-    warm: bool,
+    /// Samples of warming up.
+    before: usize,
     pilot: f64,
     seconds: Vec<f64>,
 }
@@ -87,12 +96,12 @@ fn ask(
     inputs: &Bundle,
     timeout: Duration,
     batch: usize,
-    warm: bool,
+    before: usize,
 ) -> Option<f64> {
     let question = Question {
         stage,
         inputs,
-        samples: if warm { 2 } else { 1 },
+        samples: before + 1,
         batch,
         timeout,
     };
