@@ -12,10 +12,10 @@ use crate::stages::{self, Stage};
 /// A sample lasts about this long or one call.
 const SAMPLE_SECONDS: f64 = 2e-3;
 const MOST_BATCH: f64 = 2000.0;
-/// All rounds of one engine on one case last about this long.
+/// All rounds of one engine on one case last about this long, warming up apart.
 const BUDGET_SECONDS: f64 = 2.0;
 const ROUNDS: (usize, usize) = (5, 15);
-/// Calls before a sample last about this long, where one takes less. Threads of the engine before, OpenBLAS's above all, look for more work for 35 ms after
+/// Calls before a sample last up to this long, where one takes less. Threads of the engine before, OpenBLAS's above all, look for more work for 35 ms after
 /// their last call, and the scheduler leaves two threads that wake up together on one core for up to 50 ms while the other idles.
 const WARM_UP_SECONDS: f64 = 0.1;
 /// An engine whose call takes longer has one sample, from before the first round.
@@ -41,15 +41,10 @@ pub fn measure(
         // The first call warms up; the second says how long one takes.
         if let Some(seconds) = timed(engine, 1, 1) {
             let batch = (SAMPLE_SECONDS / seconds).clamp(1.0, MOST_BATCH).ceil() as usize;
-            let before = WARM_UP_SECONDS / (seconds * batch as f64);
             runs.push(Run {
                 place,
                 batch,
-                before: if before > 1.0 {
-                    before.ceil() as usize
-                } else {
-                    0
-                },
+                before: (WARM_UP_SECONDS / (seconds * batch as f64)) as usize,
                 pilot: seconds,
                 seconds: Vec::from_iter((seconds > SLOW_SECONDS).then_some(seconds)),
             });
