@@ -26,7 +26,8 @@ impl Gram {
         }
     }
 
-    /// Adds a block of the entries, rows x vectors with contiguous columns. About rows * vectors^2 flops.
+    /// Adds a block of the entries, rows x vectors. Its columns must be contiguous, as those of a [`Mat`] are: others would be left out. About
+    /// rows * vectors^2 flops.
     ///
     /// Each inner product is summed in eight lanes, each product fused with its sum, whatever the instruction set; the last rows mod 8 follow by themselves.
     pub fn add(&mut self, block: MatRef<'_, f64>) {

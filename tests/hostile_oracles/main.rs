@@ -197,7 +197,7 @@ fn processes(of: &str) -> Vec<String> {
 fn assert_gone(of: &str) {
     let deadline = Instant::now() + Duration::from_secs(5);
     while !processes(of).is_empty() && Instant::now() < deadline {
-        std::thread::yield_now();
+        std::thread::sleep(Duration::from_millis(10));
     }
     assert_eq!(processes(of), [""; 0]);
 }
